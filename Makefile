@@ -9,45 +9,55 @@
 # python3 are tried.
 
 .SUFFIXES:
-.PHONY: setup demo test lint compiled docs clean
+.PHONY: setup demo test lint compiled collected docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
-# The empty file that a finished installation leaves. It names the folder, as an environment
-# that was copied or moved elsewhere does not work there.
-DONE := $(VENV)/installed$(subst /,-,$(subst $() $(),-,$(CURDIR)))
-PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
+# Empty files that tell what is installed: the package with what it needs, and everything. They name
+# the folder, as an environment that was copied or moved elsewhere does not work there.
+HERE := $(subst /,-,$(subst $() $(),-,$(CURDIR)))
+CORE := $(VENV)/core$(HERE)
+DONE := $(VENV)/installed$(HERE)
+# Bytecode is made when a module is first imported, as most modules of the packages never are.
+INSTALL := $(BIN)/python -m pip --disable-pip-version-check -qq install --no-compile -c constraints.txt
+FAILED := { echo "setup: installation failed; see the lines above, then run make setup again" >&2; exit 1; }
 SOURCES := setup.py setup.cfg pyproject.toml package.xml stiction_ros/__init__.py studies/pyproject.toml \
     $(wildcard resource/* launchers/* launch/* config/*)
 
-setup: $(DONE)
-	@$(MAKE) --no-print-directory compiled
+setup:
+	@$(MAKE) --no-print-directory -j2 $(DONE) compiled
 	@echo "setup: done, the command is $(BIN)/stiction"
 
 # A first or broken-off installation starts from an empty environment; after that only what
 # has changed is installed. The package and its studies are installed editable, so that the
 # command and the nodes follow the tree; install_data adds what an editable installation leaves out:
-# launchers, marker and config files. Bytecode is made when a module is first imported, as most
-# modules of the packages never are. $(BIN)/python is missing when its Python has gone.
-$(DONE): constraints.txt $(SOURCES) $(if $(realpath $(BIN)/python),,missing)
+# launchers, marker and config files. $(BIN)/python is missing when its Python has gone.
+$(CORE): constraints.txt $(SOURCES) $(if $(realpath $(BIN)/python),,missing)
 	@test -e $@ -a -x $(BIN)/python || { $(find-python); \
 	    echo "setup: new environment $(VENV) with `$$python --version`"; \
 	    $$python -m venv --clear $(VENV) || \
 	    { echo "setup: $$python cannot make $(VENV); see the lines above" >&2; exit 1; }; }
 	@rm -f $@
 	@echo "setup: installing"
-	@$(PIP) install -c constraints.txt "setuptools<80" wheel && \
-	$(PIP) install -c constraints.txt --no-build-isolation \
-	    -e ".[ros,opcua,survey,dask,docs,test]" -e studies && \
-	$(BIN)/python -W ignore setup.py -q install_data --install-dir $(VENV) || \
-	{ echo "setup: installation failed; see the lines above, then run make setup again" >&2; \
-	  exit 1; }
+	@$(INSTALL) "setuptools<80" wheel && $(INSTALL) --no-build-isolation -e . && \
+	$(BIN)/python -W ignore setup.py -q install_data --install-dir $(VENV) || $(FAILED)
 	@touch $@
 
-# The first identification would compile for half a minute; machine code is kept beside the modules.
-compiled: $(DONE)
-	@echo "setup: machine code, half a minute at the first time"
+# All other packages; machine code is made meanwhile, as it needs none of them. Both files are made at
+# the end: where this is broken off, the next installation starts from an empty environment.
+$(DONE): $(CORE)
+	@rm -f $(CORE) $@
+	@$(INSTALL) --no-build-isolation "stiction_ros[ros,opcua,survey,dask,docs,test]" -e studies || \
+	$(FAILED)
+	@touch $(CORE) $@
+
+# The first identification and the first gap would compile for a minute; machine code is kept beside
+# the modules.
+compiled: $(CORE)
+	@echo "setup: machine code, a minute at the first time"
 	@$(BIN)/python -c "from stiction_ros.identification.warm_up import compile_loops; compile_loops()"
+	@$(BIN)/python -c "import stiction_ros as s; loop = s.LoopModel.load(s.find_config('flow.loop.yaml')); \
+	    s.find_gap(loop, [s.simulate(loop, samples=600)], s.GapOptions(quick=True))"
 
 .PHONY: missing
 missing:
@@ -81,12 +91,16 @@ lint: $(DONE)
 # Bytecode is kept, as hundreds of processes start in the tests: each would compile all modules anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Machine code is made beside the linters, which leave a core for that: all workers would make the
-# same at once. Three of them keep two cores busy, as tests of the nodes wait for each other.
-test: $(DONE)
-	$(MAKE) -j2 lint compiled
-	$(BIN)/python -m pytest -n 3 --dist loadfile -m "not alone" $(ARGS)
+# Beside the linters, which leave a core for that, machine code is made and the bytecode of the tests:
+# all workers would make the same at once. Three of them keep two cores busy, as tests of the nodes
+# wait for each other. Files run in order: else those with few tests came last, which are the long ones.
+test:
+	$(MAKE) -j2 lint compiled collected
+	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder -m "not alone" $(ARGS)
 	$(BIN)/python -m pytest -m alone $(ARGS) || test $$? -eq 5  # 5: ARGS picks none of them
+
+collected: $(DONE)
+	@$(BIN)/python -m pytest --collect-only -qq $(ARGS) > /dev/null || true  # the workers say what fails
 
 docs: $(DONE)
 	$(BIN)/mkdocs build --strict --clean

@@ -25,8 +25,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 if (Path(sys.prefix) / "share" / "ament_index").is_dir():
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
 
-# No example is timed: how long one takes says how busy the machine is.
-settings.register_profile("untimed", deadline=None)
+WHOLE = os.environ.get("STICTION_ALL_TRIALS") == "1"
+
+# No example is timed: how long one takes says how busy the machine is. Many are for all trials.
+settings.register_profile("untimed", deadline=None, max_examples=100 if WHOLE else 25)
 settings.load_profile("untimed")
 
 
@@ -39,7 +41,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Skip the trials unless all are asked for."""
-    if os.environ.get("STICTION_ALL_TRIALS") == "1":
+    if WHOLE:
         return
     for item in items:
         if item.get_closest_marker("trial"):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numba import TypingError
@@ -27,7 +27,6 @@ def _combined(values: FloatArray, factor: float, out: FloatArray) -> None:
     put(out, 7 * LANES, row(values, 3))
 
 
-@settings(max_examples=30, deadline=None)
 @given(values=ROWS, factor=st.floats(-10.0, 10.0))
 def test_every_lane_is_computed_as_by_itself(values: FloatArray, factor: float) -> None:
     out = np.full((9, LANES), 7.0)

@@ -48,10 +48,10 @@ def run(options: argparse.Namespace) -> int:
         )
     from asyncua import ua
 
-    from stiction_ros.opcua.browsing import TagNames, browse, loops_of
+    from stiction_ros.opcua.browsing import browse, loops_of
     from stiction_ros.opcua.session import describe
 
-    names = TagNames(options.pv, options.op, options.sp, options.mode)
+    names = {key: getattr(options, key) for key in ("pv", "op", "sp", "mode")}
     try:
         found = asyncio.run(browse(options.url, credentials_of(options), options.root))
     except (OSError, TimeoutError, ua.UaError) as error:
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
     loops = loops_of(found, names, options.sample_time)
     if not loops:
         raise InputError(
-            f"none of {len(found)} variables is {names.pv} beside {names.op}",
+            f"none of {len(found)} variables is {options.pv} beside {options.op}",
             where=options.url,
             fix="say by --pv and --op how they are called",
         )

@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
     from stiction_ros.discrepancy import GapOptions, find_discrepancy
 
     settings = GapOptions(
-        quick=options.quick, seed=options.seed, free_process=bool(options.fit_linear)
+        quick=options.quick, seed=options.seed, process_fitted=bool(options.fit_linear)
     )
     with bar("comparing") as show:
         found = find_discrepancy(model, records, settings, progress=show)
@@ -109,7 +109,7 @@ def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
                 "is a loop model", where=path, fix="leave it out, --fit-linear makes one"
             )
         records = [_record(path, options) for path in options.inputs]
-        from stiction_ros.discrepancy.data.first_model import first_model
+        from stiction_ros.discrepancy.process.first_model import first_model
 
         return first_model(records, options.delay), records
     if len(options.inputs) < 2:
@@ -176,8 +176,7 @@ def _print(found: Discrepancy) -> None:
             name = called(effect.place, effect.effect)
             console.print(f"{name}{law}: {plain(said)}", markup=False)
     for change in found.process_changes:
-        said = f"process to {change.output}: {change.what} {change.value:.4g} {change.unit}"
-        console.print(said.removesuffix(" 1"), markup=False)
+        console.print(f"process to {change.output}: {change.sentence}", markup=False)
     console.print(_gaps(found))
     for sentence in found.where:
         console.print(f"where: {plain(sentence)}", markup=False)

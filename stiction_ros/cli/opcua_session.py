@@ -19,7 +19,6 @@ def add_session(parser: argparse.ArgumentParser) -> None:
         ("--server-certificate", "F", "pinned certificate of the server, DER"),
         ("--user", "NAME", "name of the user"),
         ("--password-file", "F", "file with the password, mode 600"),
-        ("--password-variable", "NAME", "environment variable with the password"),
     ):
         group.add_argument(name, default="", metavar=metavar, help=text)
 
@@ -30,14 +29,6 @@ def credentials_of(options: argparse.Namespace) -> Credentials:
     Raises:
         InputError: files that lack or that others may read.
     """
-    found = Credentials(
-        options.security,
-        options.certificate,
-        options.private_key,
-        options.server_certificate,
-        options.user,
-        options.password_file,
-        options.password_variable,
-    )
+    found = Credentials.of(options)
     found.check(writes=False)
     return found

@@ -8,9 +8,8 @@ from typing import Any
 
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.finish import Packing
+from stiction_ros.records.bag.finish import COMPRESSIONS, Packing
 from stiction_ros.records.bag.repair import Repair, RepairStatus, repair_bag
-from stiction_ros.records.storage.mcap_chunked import COMPRESSIONS
 
 _SAID = {
     RepairStatus.WHOLE: "nothing to repair",

@@ -17,8 +17,8 @@ class GapOptions:
         quick: take the stored threshold and intervals of the likelihood instead of bootstraps.
         margin: BIC by which an effect must beat no effect and its best rival.
         most_effects: how many effects are added at most.
-        free_process: let the process be refitted with every candidate, as for a model that
-            was fitted to these records without any effect.
+        process_fitted: the process was fitted to these records, as by ``gap --fit-linear``: its
+            figures stay open, and no change of them is named.
         resamples: of each bootstrap.
         seed: of the bootstraps.
 
@@ -34,7 +34,7 @@ class GapOptions:
     quick: bool = False
     margin: float = MARGIN
     most_effects: int = 3
-    free_process: bool = False
+    process_fitted: bool = False
     resamples: int = 40
     seed: int = 0
 

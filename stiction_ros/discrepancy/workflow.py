@@ -61,6 +61,6 @@ def find_discrepancy(
     with one_thread():
         task, state = begin(model, measured, options or GapOptions(), progress)
         state = look_on(task, state)
-        if not task.options.free_process:
+        if not task.options.process_fitted:
             state = settle(task, state)
         return closing(task, state)

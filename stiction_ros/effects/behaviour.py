@@ -23,10 +23,11 @@ from stiction_ros.errors import InputError
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 Memory = float | tuple[float, ...]
+Start = FloatArray | float  # where a signal had rested: one value, or one for each point of a grid
 NO_SAMPLE = -1.0  # in a memory that holds the time of the last sample: there was none
 
 
-def starts(start: FloatArray | float, points: int) -> FloatArray:
+def starts(start: Start, points: int) -> FloatArray:
     """Return where each point of a grid had rested, shape (G,), from one value or one each."""
     return np.broadcast_to(np.asarray(start, dtype=float), points).copy()
 
@@ -82,10 +83,6 @@ class Behaviour(ABC):
         effect: name in YAML.
         law: which of several laws of one effect, or None.
         places: where it can act: ``valve``, ``process``, ``disturbance``, ``sensor``, ``data``.
-        signature: what a record of the loop shows, one sentence without a full stop.
-        minimum_data: what a record must hold to tell its size, one sentence without a full stop.
-        confusable: places and effects, such as ``sensor lag``, that look alike; none where
-            nothing does.
         experiment: what to record so that it shows, in the imperative.
         separation: what tells it from what looks alike, in the imperative.
         family: effects of one family at one place are told apart by a test of their own, or
@@ -111,11 +108,7 @@ class Behaviour(ABC):
 
     effect: ClassVar[str]
     law: ClassVar[str | None] = None
-    # For the page of the catalogue, docs/effects.md.
     places: ClassVar[tuple[str, ...]] = ()
-    signature: ClassVar[str] = ""
-    minimum_data: ClassVar[str] = ""
-    confusable: ClassVar[tuple[str, ...]] = ()
     # For `stiction gap`.
     experiment: ClassVar[str] = ""
     separation: ClassVar[str] = ""
@@ -125,7 +118,7 @@ class Behaviour(ABC):
     bends: ClassVar[bool] = False
     in_values: ClassVar[bool] = False
     not_searched: ClassVar[str] = "it names no axes on which its figures are searched"
-    told_of_step: ClassVar[tuple[str, ...]] = ("simulate_grid",)
+    told_of_step: ClassVar[tuple[str, ...]] = ("simulate_grid", "filter")
 
     def __init_subclass__(cls) -> None:
         """Take back what a base class said of its own :meth:`step` where this one has another.
@@ -140,8 +133,6 @@ class Behaviour(ABC):
             if name not in cls.__dict__:
                 safe = [kind.__dict__[name] for kind in cls.__mro__ if name in kind.__dict__]
                 setattr(cls, name, safe[-1])
-        if "filter" not in cls.__dict__ and hasattr(cls, "filter"):
-            cls.filter = None  # no LinearFilter
 
     def __post_init__(self) -> None:
         for entry in self.parameters():
@@ -229,11 +220,7 @@ class Behaviour(ABC):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
         """Return outputs, shape (N, G), for ``grid`` of shape (G, parameters).
 
@@ -247,6 +234,14 @@ class Behaviour(ABC):
         """
         rows = zip(grid.tolist(), starts(start, len(grid)).tolist(), strict=True)
         return np.stack([cls(*row).simulate(values, at, sample_time) for row, at in rows], axis=1)
+
+    def filter(self, sample_time: float) -> Filter | None:
+        """Return the behaviour as a filter of samples ``sample_time`` seconds apart.
+
+        Returns:
+            None for one that is not linear, or that changes with time.
+        """
+        return None
 
     @classmethod
     def axes(cls, seen: Seen) -> tuple[Axis, ...]:
@@ -273,38 +268,6 @@ class Behaviour(ABC):
             float(axis.outer(np.array([0.5 * (axis.inner(axis.low) + axis.inner(axis.high))]))[0])
             for axis in cls.axes(seen)
         )
-
-
-@runtime_checkable
-class SimulatesGrid(Protocol):
-    """A behaviour that simulates many parameter sets at once."""
-
-    @classmethod
-    def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
-    ) -> FloatArray:
-        """Return outputs, shape (N, G), for ``grid`` of shape (G, parameters).
-
-        Args:
-            grid: one set of parameters a row.
-            values: the incoming signal, shape (N,).
-            start: where it had rested before, one for all or shape (G,).
-            sample_time: s; only behaviours with a time of their own take notice.
-        """
-        ...
-
-
-@runtime_checkable
-class LinearFilter(Protocol):
-    """A behaviour that is linear and does not change with time."""
-
-    def filter(self, sample_time: float) -> Filter:
-        """Return the behaviour as a filter of samples ``sample_time`` seconds apart."""
-        ...
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import Behaviour, Filter, FloatArray, Memory
+from stiction_ros.effects.behaviour import Behaviour, Filter, FloatArray, Memory, Start
 
 LONGEST = 1000.0
 
@@ -17,9 +17,6 @@ class Delay(Behaviour):
     r"""y_k = (1 − f) x_{k−n} + f x_{k−n−1} for a delay of n + f samples, 0 ≤ f < 1.
 
     The memory holds the last samples of x, the newest first.
-
-    Raises:
-        InputError: a delay out of range.
     """
 
     @property
@@ -31,7 +28,6 @@ class Delay(Behaviour):
         return (value,) * math.ceil(self.samples)
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        """Return the memory and the delayed sample."""
         assert isinstance(memory, tuple)
         line = (value, *memory)
         whole, rest = int(self.samples), self.samples % 1.0
@@ -40,13 +36,8 @@ class Delay(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return outputs, shape (N, G), for rows (delay in samples,)."""
         starts = np.broadcast_to(np.asarray(start, dtype=float), len(grid))
         rows = zip(grid[:, 0].tolist(), starts.tolist(), strict=True)
         return np.stack([_delayed(values, delay, at) for delay, at in rows], axis=1)

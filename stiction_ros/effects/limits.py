@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory
+from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, Start
 from stiction_ros.errors import InputError
 
 
@@ -36,11 +36,6 @@ class Limits(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return outputs, shape (N, G), for rows (low, high)."""
         return np.minimum(np.maximum(values[:, None], grid[:, 0]), grid[:, 1])

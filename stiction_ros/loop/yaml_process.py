@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from stiction_ros.effects import Behaviour, FloatArray, LinearFilter
+from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop.yaml_effects import read_effects
 from stiction_ros.loop.yaml_reading import Section
@@ -212,7 +212,7 @@ def _read_filters(entry: Section) -> tuple[Behaviour, ...]:
     """Return the effects on the process side of one output, which must be linear."""
     effects = read_effects(entry, "process")
     for i, effect in enumerate(effects):
-        if not isinstance(effect, LinearFilter):
+        if effect.filter(1.0) is None:
             raise InputError(
                 f"{effect.title()} cannot act on a process",
                 where=f"{entry.at('effects')}[{i}]",

@@ -158,9 +158,9 @@ class Section:
             )
         return np.array([number(v, f"{self.at(key)}[{i}]") for i, v in enumerate(value)])
 
-    def matrix(self, key: str, default: Any = _REQUIRED) -> FloatArray:
+    def matrix(self, key: str) -> FloatArray:
         """Return a matrix given as a list of rows of equal length."""
-        rows = self.raw(key, default)
+        rows = self.raw(key)
         if not isinstance(rows, list | tuple) or not rows:
             raise InputError("is no list of rows", where=self.at(key))
         out = []

@@ -57,15 +57,7 @@ class OpcuaNode(ManagedNode):
         self._loops = self._chosen(told)
         self._url = settings.url or told.server
         check_address(self._url, "opcua: url")
-        self._credentials = Credentials(
-            settings.security,
-            settings.certificate,
-            settings.private_key,
-            settings.server_certificate,
-            settings.user,
-            settings.password_file,
-            settings.password_variable,
-        )
+        self._credentials = Credentials.of(settings)
         self._credentials.check(bool(self._writes))
         self._said = "not connected yet"
         self._losses = 0

@@ -21,7 +21,7 @@ from stiction_ros.nodes.shared.peers import Outlet
 from stiction_ros.nodes.shared.runner import run
 from stiction_ros.nodes.shared.typed import quality
 from stiction_ros.online.plain_settings import PlayerNodeSettings
-from stiction_ros.records.bag.playback import Playback, PlaybackOptions, bag_content, offered_qos
+from stiction_ros.records.bag.playback import Playback, bag_content, offered_qos
 from stiction_ros.records.storage.bag_metadata import BagTopic, Qos
 from stiction_ros.records.storage.mcap_scan import RawMessage
 
@@ -48,8 +48,8 @@ class PlayerNode(ManagedNode):
         if not settings.bag:
             raise InputError("no bag", where="player: bag", fix="set it to a bag")
         content = bag_content(settings.bag, settings.topics)
-        options = PlaybackOptions(settings.rate, settings.start, settings.loop)
-        self.playback = Playback(settings.bag, content, self._now, options, wanted=settings.topics)
+        how = settings.rate, settings.start, settings.loop
+        self.playback = Playback(content, self._now, *how)
         self._skipped: dict[str, str] = {}
         self._topics: dict[str, Outlet] = {}
         recorded = settings.clock == "auto" and CLOCK in content.topics

@@ -27,7 +27,7 @@ from stiction_ros.online.health import Noticed
 from stiction_ros.online.plain_settings import RecorderNodeSettings
 from stiction_ros.records.bag.finish import CLOCK
 from stiction_ros.records.bag.message_definitions import definition
-from stiction_ros.records.bag.topic_choice import OWN, TopicChoice
+from stiction_ros.records.bag.topic_choice import OWN, topic_choice
 from stiction_ros.records.bag.writer import BagWriter, Packing, Splitting
 from stiction_ros.records.run.loop_signals import JOINT_STATE
 from stiction_ros.records.storage.log_time import SIMULATED, LogTime
@@ -54,7 +54,7 @@ class RecorderNode(ManagedNode):
         settings = self.settings
         names = [self.resolve_topic_name(name) for name in settings.topics if name]
         space = self.get_namespace()
-        self._wanted = TopicChoice.of(names, settings.regex, settings.exclude_regex, space)
+        self._wanted = topic_choice(names, settings.regex, settings.exclude_regex, space)
         splitting = Splitting(settings.max_bag_size, round(settings.max_bag_duration * SECOND))
         directory = free_directory(Path(settings.directory), self._bags)
         self.writer = BagWriter(directory, Packing(settings.compression), splitting)
@@ -121,7 +121,7 @@ class RecorderNode(ManagedNode):
     def _discover(self) -> None:
         """Subscribe to every wanted topic that has appeared since the last look."""
         for name, types in self.get_topic_names_and_types():
-            if name in self._topics or name in self._skipped or name not in self._wanted:
+            if name in self._topics or name in self._skipped or not self._wanted(name):
                 continue
             offered = self.get_publishers_info_by_topic(name)
             if not offered:

@@ -156,9 +156,6 @@ class OpcuaNodeSettings(NodeSettings):
     )
     user: str = setting("", "name of the user; empty for none", fixed=True)
     password_file: str = setting("", "file of the user's password, mode 600", fixed=True)
-    password_variable: str = setting(
-        "", "environment variable of the user's password, in place of the file", fixed=True
-    )
     publishing: float = setting(
         0.1, "s between two publications of the server", low=0.005, high=60.0, fixed=True
     )

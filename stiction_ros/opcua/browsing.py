@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -16,23 +15,6 @@ if TYPE_CHECKING:
 
 DEPTH = 8  # levels of folders
 MOST = 200_000  # nodes that are looked at
-
-
-@dataclasses.dataclass(frozen=True)
-class TagNames:
-    """How the control system calls the tags of a controller; ``sp`` and ``mode`` may lack."""
-
-    pv: str = "PV"
-    op: str = "OUT"
-    sp: str = "SP"
-    mode: str = "MODE"
-
-    def key_of(self, name: str) -> str:
-        """Return which of them ``name`` is; empty for none."""
-        for key in ("pv", "op", "sp", "mode"):
-            if name.casefold() == getattr(self, key).casefold():
-                return key
-        return ""
 
 
 async def browse(url: str, credentials: Credentials, root: str) -> dict[tuple[str, str], str]:
@@ -93,14 +75,20 @@ def url_of(client: Client) -> str:
 
 
 def loops_of(
-    found: Mapping[tuple[str, str], str], names: TagNames, sample_time: float
+    found: Mapping[tuple[str, str], str], names: Mapping[str, str], sample_time: float
 ) -> list[dict[str, Any]]:
-    """Return the loops of a tag map, one for each group that has a PV and an OP."""
+    """Return the loops of a tag map, one for each group that has a PV and an OP.
+
+    Args:
+        found: node ids by group and name.
+        names: how the control system calls ``pv``, ``op``, ``sp`` and ``mode``.
+        sample_time: s.
+    """
+    key_of = {name.casefold(): key for key, name in names.items()}
     groups: dict[str, dict[str, str]] = {}
     for (group, name), node in found.items():
-        key = names.key_of(name)
-        if key:
-            groups.setdefault(group, {})[key] = node
+        if name.casefold() in key_of:
+            groups.setdefault(group, {})[key_of[name.casefold()]] = node
     loops, taken = [], set()
     for group, tags in sorted(groups.items()):
         name = re.sub(r"\W+", "_", group, flags=re.ASCII).strip("_")

@@ -105,8 +105,7 @@ class HistoryFile:
     def read(self) -> TagHistory:
         """Return what there is; of equal stamps the last."""
         found: dict[int, float] = {}
-        for line in self.path.read_text(encoding="utf-8").splitlines()[1:]:
-            stamp, value, quality = _parts(line)
+        for stamp, value, quality in self._lines():
             good = quality == TagQuality.GOOD and not value.startswith('"')
             found[stamp] = float(value) if good else float("nan")
         stamps = np.array(sorted(found), dtype=np.int64)
@@ -115,8 +114,7 @@ class HistoryFile:
     def read_modes(self) -> tuple[np.ndarray[Any, np.dtype[np.int64]], list[str]]:
         """Return stamps, ns, and modes as text; those of bad quality are left out."""
         found: dict[int, str] = {}
-        for line in self.path.read_text(encoding="utf-8").splitlines()[1:]:
-            stamp, value, quality = _parts(line)
+        for stamp, value, quality in self._lines():
             if quality == TagQuality.GOOD:
                 found[stamp] = mode_text(json.loads(value) if value[0] == '"' else float(value))
         stamps = sorted(found)
@@ -125,19 +123,21 @@ class HistoryFile:
     @property
     def last(self) -> int | None:
         """Stamp of the last value, ns; None before the first."""
-        lines = self.path.read_text(encoding="utf-8").splitlines()[1:]
-        return int(lines[-1].split(",")[0]) if lines else None
+        lines = self._lines()
+        return lines[-1][0] if lines else None
+
+    def _lines(self) -> list[tuple[int, str, int]]:
+        """Return stamp, value as it stands there, and quality of each line."""
+        found = []
+        for line in self.path.read_text(encoding="utf-8").splitlines()[1:]:
+            stamp, _, rest = line.partition(",")
+            value, _, quality = rest.rpartition(",")
+            found.append((int(stamp), value, int(quality)))
+        return found
 
 
 def _shown(reading: TagReading) -> str:
     return json.dumps(reading.value) if isinstance(reading.value, str) else repr(reading.number)
-
-
-def _parts(line: str) -> tuple[int, str, int]:
-    """Return stamp, value as it stands there, and quality of a line."""
-    stamp, _, rest = line.partition(",")
-    value, _, quality = rest.rpartition(",")
-    return int(stamp), value, int(quality)
 
 
 def fetch(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import enum
 from collections import Counter
 from collections.abc import Mapping
 
@@ -17,7 +16,7 @@ from stiction_ros.opcua.heartbeat import HeardBeat, OwnBeat, identity_of
 from stiction_ros.opcua.op_limits import OpLimits, RateWatch
 from stiction_ros.opcua.reading import TagQuality, TagReading
 from stiction_ros.opcua.sampling import LoopSampler, PlantSample
-from stiction_ros.opcua.tag_map import GrantTags, LoopTags
+from stiction_ros.opcua.tag_map import GrantTags, LoopTags, Use
 
 PATIENCE = 3  # samples of bad quality in succession before the plant takes over
 BEATS = 5  # beats in the time of the watchdog
@@ -25,14 +24,6 @@ SLOW = 2  # a part of the watchdog's time: an answer may take that long
 IN_TIME = 0.5  # s, or a sample where that is longer, in which an OP must be written
 AGAIN = 1.0  # s between two attempts to take a request back
 MODE_REFUSES = "the mode does not grant it"
-
-
-class OrderKind(enum.Enum):
-    """What is written."""
-
-    REQUEST = "request"
-    BEAT = "beat"
-    OP = "op"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +40,7 @@ class WriteOrder:
     """
 
     loop: str
-    kind: OrderKind
+    kind: Use
     values: tuple[tuple[str, float], ...]
     expires: float
     modes: tuple[str, ...] = ()
@@ -286,7 +277,7 @@ class LoopBridge:
             return []
         self._tried = wanted, now
         values = ((told.request, wanted),)
-        return [WriteOrder(self.tags.loop, OrderKind.REQUEST, values, now + told.watchdog)]
+        return [WriteOrder(self.tags.loop, Use.REQUEST, values, now + told.watchdog)]
 
     def _beats(self, now: float) -> list[WriteOrder]:
         told = self.tags.grant
@@ -295,7 +286,7 @@ class LoopBridge:
             return []
         self._beat_at = now
         values = ((told.heartbeat, float(self._beat.next())),)
-        return [WriteOrder(self.tags.loop, OrderKind.BEAT, values, now + told.watchdog / BEATS)]
+        return [WriteOrder(self.tags.loop, Use.BEAT, values, now + told.watchdog / BEATS)]
 
     # ---- the OP ----------------------------------------------------------------------------
 
@@ -338,7 +329,7 @@ class LoopBridge:
         values = tuple((v.op, float(x)) for v, x in zip(self.tags.valves, op, strict=True))
         modes = tuple(valve.mode for valve in self.tags.valves)
         self._writing_until = expires = now + max(self.period, IN_TIME)
-        return [WriteOrder(self.tags.loop, OrderKind.OP, values, expires, modes, told.granted)]
+        return [WriteOrder(self.tags.loop, Use.OP, values, expires, modes, told.granted)]
 
     def written(
         self, order: WriteOrder, failure: str, seconds: float, now: float
@@ -354,9 +345,9 @@ class LoopBridge:
         told = self.tags.grant
         assert told is not None
         self.counts[f"{order.kind.value}_{'failed' if failure else 'written'}"] += 1
-        if order.kind is OrderKind.REQUEST and not failure:
+        if order.kind is Use.REQUEST and not failure:
             self._told = order.values[0][1]
-        if order.kind is OrderKind.OP:
+        if order.kind is Use.OP:
             if not failure and self._writing is not None:
                 self._last = self._writing, now
             self._writing = None

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from stiction_ros.errors import InputError
-from stiction_ros.opcua.loop_bridge import OrderKind, WriteOrder
+from stiction_ros.opcua.loop_bridge import WriteOrder
 from stiction_ros.opcua.reading import TagReading
 from stiction_ros.opcua.security import Credentials
 from stiction_ros.opcua.server_tags import ServerTags
@@ -285,11 +285,11 @@ class PlantLink:
 
     def _put(self, order: WriteOrder) -> None:
         """Queue an order; what its loop wanted before a request is not written any more."""
-        if order.kind is OrderKind.REQUEST:
+        if order.kind is Use.REQUEST:
             waiting = [self._orders.get_nowait() for _ in range(self._orders.qsize())]
             for one in waiting:
                 self._orders.task_done()
-                if one.loop == order.loop and one.kind is not OrderKind.REQUEST:
+                if one.loop == order.loop and one.kind is not Use.REQUEST:
                     self._tell(Written(one, "a request came after it", 0.0))
                 else:
                     self._orders.put_nowait(one)

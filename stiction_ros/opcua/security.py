@@ -30,8 +30,7 @@ class Credentials:
         certificate, private_key: files of ours, DER and PEM.
         server_certificate: file of the certificate that the server must show, DER.
         user: name; empty for none.
-        password_file: file of the password; or
-        password_variable: environment variable of it.
+        password_file: file of the password.
     """
 
     security: str = SECURITY[0]
@@ -40,7 +39,11 @@ class Credentials:
     server_certificate: str = ""
     user: str = ""
     password_file: str = ""
-    password_variable: str = ""
+
+    @classmethod
+    def of(cls, given: object) -> Credentials:
+        """Return what settings, or options of a command, say under the same names."""
+        return cls(*(getattr(given, field.name) for field in dataclasses.fields(cls)))
 
     def check(self, writes: bool) -> None:
         """Refuse what cannot be connected with, and writing without encryption or user.
@@ -78,20 +81,13 @@ class Credentials:
             self.password()
 
     def password(self) -> str:
-        """Return the password from its file or variable.
+        """Return the password from its file.
 
         Raises:
-            InputError: neither or both are named, it lacks, or others may read the file.
+            InputError: none is named, it lacks, or others may read it.
         """
-        if bool(self.password_file) == bool(self.password_variable):
-            raise InputError(
-                "one of password_file and password_variable is needed", where=f"user {self.user}"
-            )
-        if self.password_variable:
-            found = os.environ.get(self.password_variable, "")
-            if not found:
-                raise InputError("is not set", where=f"environment {self.password_variable}")
-            return found
+        if not self.password_file:
+            raise InputError("password_file is needed", where=f"user {self.user}")
         path = Path(self.password_file)
         check_secret_file(path)
         return path.read_text(encoding="utf-8").strip("\r\n")

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 WIDE = frozenset({"Int32", "UInt32", "Int64", "UInt64", "Double"})  # they hold a beat of 31 bits
 NUMBERS = WIDE | {"SByte", "Byte", "Int16", "UInt16", "Float"}
-FITTING = {Use.REQUEST: NUMBERS | {"Boolean"}, Use.HEARTBEAT: WIDE, Use.OP: NUMBERS}
+FITTING = {Use.REQUEST: NUMBERS | {"Boolean"}, Use.BEAT: WIDE, Use.OP: NUMBERS}
 NEEDS = {
     Use.REQUEST: "a request is a number or Boolean",
-    Use.HEARTBEAT: "a heartbeat is a whole number of 32 bits",
+    Use.BEAT: "a heartbeat is a whole number of 32 bits",
     Use.OP: "an OP is a number",
 }
 QUEUE = 100  # changes of one tag that the server keeps between two publications

@@ -195,11 +195,6 @@ def describe(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-async def kinds_of(client: Client, written: dict[str, ua.NodeId]) -> dict[str, ua.VariantType]:
-    """Return the type of number that each written tag takes."""
-    return {tag: await kind_of(client, node) for tag, node in written.items()}
-
-
 async def kind_of(client: Client, node: ua.NodeId) -> ua.VariantType:
     """Return the type of value that a node takes.
 

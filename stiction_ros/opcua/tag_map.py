@@ -22,7 +22,7 @@ class Use(enum.Enum):
     """What a tag is written for."""
 
     REQUEST = "request"
-    HEARTBEAT = "heartbeat"
+    BEAT = "beat"
     OP = "op"
 
 
@@ -126,7 +126,7 @@ class LoopTags:
         """Yield the tags that may be written, each with what for."""
         if self.grant is not None:
             yield self.grant.request, Use.REQUEST
-            yield self.grant.heartbeat, Use.HEARTBEAT
+            yield self.grant.heartbeat, Use.BEAT
             yield from ((valve.op, Use.OP) for valve in self.valves)
 
     @property

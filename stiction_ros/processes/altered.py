@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction_ros.effects import Behaviour, Filter, FloatArray, LinearFilter
+from stiction_ros.effects import Behaviour, Filter, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.processes.linear import LinearModel
 from stiction_ros.processes.process import Process
@@ -96,9 +96,10 @@ class AlteredProcess(Process):
 
 
 def _filter(effect: Behaviour, sample_time: float) -> Filter:
-    if not isinstance(effect, LinearFilter):
+    found = effect.filter(sample_time)
+    if found is None:
         raise InputError(f"{effect.title()} is not linear")
-    return effect.filter(sample_time)
+    return found
 
 
 def _at_rest(entry: Filter, out: float) -> tuple[FloatArray, float]:

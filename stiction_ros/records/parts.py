@@ -10,8 +10,7 @@ import numpy as np
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Record
-from stiction_ros.records.segment import Gap
+from stiction_ros.records.record import Gap, Record
 
 DATES = 3e8
 """Seconds from which a time is shown as a date: 1979."""

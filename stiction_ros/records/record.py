@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,34 @@ from numpy.typing import NDArray
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.quality import USABLE, Quality, QualityArray
-from stiction_ros.records.segment import Gap, Segment
 from stiction_ros.signals.holds import stretches
 
 IndexArray = np.ndarray[tuple[int], np.dtype[np.intp]]
+
+
+class Gap(NamedTuple):
+    """Where a record goes on after a gap, or where another run begins.
+
+    Attributes:
+        row: first sample behind it.
+        start: time of that sample on the record's own clock, s.
+    """
+
+    row: int
+    start: float
+
+
+class Segment(NamedTuple):
+    """A stretch of samples without a gap.
+
+    Attributes:
+        first, last: its samples, ``last`` not included.
+        start: time of the first on the record's own clock, s.
+    """
+
+    first: int
+    last: int
+    start: float
 
 
 @dataclasses.dataclass(frozen=True)

@@ -106,15 +106,14 @@ class Part:
         return found
 
 
-def split_at_gaps(time: FloatArray, longest: float = GAP) -> list[tuple[int, int]]:
+def split_at_gaps(time: FloatArray) -> list[tuple[int, int]]:
     """Return first and last (not included) row of each stretch without a gap.
 
     Args:
         time: increasing times, shape (N,), s.
-        longest: step, in usual ones, above which there is a gap.
     """
     steps = np.diff(time)
-    cuts = np.flatnonzero(steps > longest * float(np.median(steps))) + 1
+    cuts = np.flatnonzero(steps > GAP * float(np.median(steps))) + 1
     edges = [0, *cuts.tolist(), len(time)]
     return list(itertools.pairwise(edges))
 

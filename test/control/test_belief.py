@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.control.belief import ValveBelief
@@ -47,7 +47,6 @@ def test_a_slip_that_no_position_escapes_makes_it_sure() -> None:
 
 @pytest.mark.parametrize("law", [HE, KanoStiction(9.0, 7.0)])
 @given(start=st.integers(0, 16), ops=st.lists(st.floats(0.0, 100.0), min_size=1, max_size=12))
-@settings(max_examples=60)
 def test_the_true_stem_is_in_the_interval_and_known_when_it_is_sure(
     law: HeStiction | KanoStiction, start: int, ops: list[float]
 ) -> None:

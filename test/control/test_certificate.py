@@ -39,7 +39,7 @@ def situation(seed: int, valves: int) -> tuple[EmbeddingMpc, np.ndarray, Target,
 
 
 @given(st.integers(0, 10_000), st.integers(1, 2))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10)
 def test_no_plan_is_cheaper_than_the_optimum(seed: int, valves: int) -> None:
     mpc, state, target, last = situation(seed, valves)
     plan, cost = planned(mpc, state, target, last)
@@ -52,7 +52,7 @@ def test_no_plan_is_cheaper_than_the_optimum(seed: int, valves: int) -> None:
 
 @pytest.mark.trial
 @given(st.integers(0, 10_000))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6)
 def test_the_optimum_is_that_of_all_patterns_one_by_one(seed: int) -> None:
     """Three free samples, one valve: 27 sequences of staying, up and down, each a plain QP."""
     mpc, state, target, last = situation(seed, 1)

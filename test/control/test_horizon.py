@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from loops import equation_19a, models, outputs_of, stable_model, target_at, weights_for
 
@@ -13,7 +13,6 @@ from stiction_ros.processes import LinearModel
 
 
 @given(models(), st.integers(1, 8), st.integers(0, 1000))
-@settings(deadline=None)
 def test_the_condensed_cost_is_19a(model: LinearModel, horizon: int, seed: int) -> None:
     random = np.random.default_rng(seed)
     weights = weights_for(model, horizon, seed=seed)
@@ -30,7 +29,6 @@ def test_the_condensed_cost_is_19a(model: LinearModel, horizon: int, seed: int) 
 
 
 @given(models(), st.integers(1, 8), st.integers(0, 1000))
-@settings(deadline=None)
 def test_condensed_outputs_are_simulated_ones(model: LinearModel, horizon: int, seed: int) -> None:
     random = np.random.default_rng(seed)
     m, p = len(model.stem0), len(model.pv0)
@@ -73,7 +71,6 @@ def test_a_path_of_steady_states_is_what_19a_is_measured_from() -> None:
 
 
 @given(models(), st.integers(1, 6), st.integers(0, 9), st.integers(0, 1000))
-@settings(max_examples=40, deadline=None)
 def test_what_a_plan_leaves_counts_for_as_long_as_is_looked_ahead(
     model: LinearModel, horizon: int, ahead: int, seed: int
 ) -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import daqp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from loops import stable_model, target_at, weights_for
 
@@ -14,7 +14,6 @@ HORIZON = 8
 
 
 @given(st.integers(0, 1000), st.floats(-1.0, 4.0))
-@settings(deadline=None)
 def test_bounds_left_out_at_first_change_no_optimum(seed: int, room: float) -> None:
     """Whether a bound binds or not, the plan is that of the whole problem, solved at once."""
     random = np.random.default_rng(seed)

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from loops import first_order, limits_for, stable_model, target_at, weights_for
 
@@ -12,7 +12,6 @@ from stiction_ros.effects import HeStiction
 
 
 @given(st.integers(0, 999), st.floats(0.5, 10.0), st.floats(0.0, 1.0), st.floats(30.0, 70.0))
-@settings(deadline=None)
 def test_the_valve_goes_as_near_to_the_plan_as_it_can(
     seed: int, static: float, share: float, last: float
 ) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from loops import first_order, kalman, luenberger, models, stable_model
 
@@ -28,7 +28,6 @@ def slowest(model: LinearModel, observer: Observer) -> float:
 
 @either
 @given(model=models(), seed=st.integers(0, 1000))
-@settings(max_examples=30, deadline=None)
 def test_a_constant_output_disturbance_is_estimated_exactly(
     tuning: Callable[[int], ObserverTuning], model: LinearModel, seed: int
 ) -> None:
@@ -63,7 +62,6 @@ def test_a_wrong_gain_leaves_no_error_at_rest(tuning: Callable[[int], ObserverTu
 
 @either
 @given(model=models())
-@settings(max_examples=40, deadline=None)
 def test_the_error_dynamics_are_stable(
     tuning: Callable[[int], ObserverTuning], model: LinearModel
 ) -> None:

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from loops import first_order, models, stable_model
 from scipy.optimize import lsq_linear
@@ -26,7 +26,6 @@ def outputs_at(model: LinearModel, stem: np.ndarray, d: np.ndarray) -> np.ndarra
 
 
 @given(models(), st.integers(0, 1000), st.floats(0.1, 10.0))
-@settings(deadline=None)
 def test_a_set_point_that_some_stems_give_is_reached(
     model: LinearModel, seed: int, weight: float
 ) -> None:
@@ -43,7 +42,6 @@ def test_a_set_point_that_some_stems_give_is_reached(
 
 
 @given(models(), st.integers(0, 1000))
-@settings(deadline=None)
 def test_a_target_is_a_steady_state_of_the_model(model: LinearModel, seed: int) -> None:
     random = np.random.default_rng(seed)
     p = len(model.pv0)
@@ -60,7 +58,6 @@ def test_a_target_is_a_steady_state_of_the_model(model: LinearModel, seed: int) 
 
 
 @given(models(), st.integers(0, 1000), st.floats(50.0, 5000.0))
-@settings(deadline=None)
 def test_an_unreachable_set_point_gets_the_nearest_output_within_the_bounds(
     model: LinearModel, seed: int, far: float
 ) -> None:

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 from gap_loops import loop, record
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
@@ -34,7 +34,6 @@ def drawn(seed: int, *shape: int) -> FloatArray:
 
 
 @given(SEEDS, st.integers(0, 6), st.floats(1e-8, 1e8))
-@settings(max_examples=25, deadline=None)
 def test_least_squares_is_that_of_numpy(seed: int, columns: int, unit: float) -> None:
     matrix, target = drawn(seed, columns, 60), drawn(seed + 1, 60)
     matrix[:1] *= unit
@@ -59,7 +58,6 @@ def test_columns_that_nearly_repeat_each_other_are_left_to_the_slow_solution() -
 
 
 @given(SEEDS, st.integers(0, 6))
-@settings(max_examples=25, deadline=None)
 def test_a_basis_is_orthonormal_and_holds_the_columns(seed: int, count: int) -> None:
     columns = drawn(seed, 60, count)
     columns = np.hstack([columns, columns[:, :2] @ np.ones((min(count, 2), 1)), np.zeros((60, 1))])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
-from stiction_ros.discrepancy.data.first_model import first_model
+from stiction_ros.discrepancy.process.first_model import first_model
 from stiction_ros.effects import FloatArray
 from stiction_ros.records.record import Record
 
@@ -37,7 +37,7 @@ def compared(
     record = Record(name, step, ("V1",), ("PV1",), op[:, None], pv[:, None])
     if stem is not None:
         record = dataclasses.replace(record, stem=stem[:, None])
-    options = GapOptions(quick=True, free_process=True)
+    options = GapOptions(quick=True, process_fitted=True)
     return find_discrepancy(first_model([record]), [record], options)
 
 

@@ -1,42 +1,44 @@
-"""The page of the catalogue and what the classes say of themselves."""
+"""The page of the catalogue says what the classes are."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 
-from stiction_ros.effects import Behaviour, behaviours
-from stiction_ros.effects.catalogue import PLACES, page
+from stiction_ros.effects import Behaviour, Parameter, behaviours
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "effects.md"
+PLACES = {
+    "valve": "Valves",
+    "process": "Process",
+    "load": "Loads",
+    "disturbance": "Disturbances",
+    "sensor": "Sensors",
+    "data": "Data",
+}
 every_behaviour = pytest.mark.parametrize("kind", behaviours(), ids=lambda kind: kind.title())
 
 
-def test_the_page_is_current() -> None:
-    again = "run python -m stiction_ros.effects.catalogue > docs/effects.md"
-    assert PAGE.read_text(encoding="utf-8") == page(), again
+def row(entry: Parameter) -> str:
+    low, high = f"{entry.low:g}", f"{entry.high:g}"
+    bounds = f"{low} … {high}" if math.isfinite(entry.high) else f"≥ {low}"
+    if not math.isfinite(entry.low):
+        bounds = f"≤ {high}" if math.isfinite(entry.high) else "any"
+    return f"| `{entry.key}` | {entry.unit} | {bounds} | {entry.description} |"
 
 
 @every_behaviour
-def test_every_effect_has_a_place(kind: type[Behaviour]) -> None:
+def test_the_page_has_every_effect_with_its_parameters(kind: type[Behaviour]) -> None:
     assert kind.places
-    assert set(kind.places) <= set(PLACES)
-
-
-@every_behaviour
-def test_every_effect_says_how_it_shows_and_what_it_needs(kind: type[Behaviour]) -> None:
-    for text in (kind.signature, kind.minimum_data):
-        assert len(text) > 10
-        assert not text.endswith(".")
-
-
-@every_behaviour
-def test_what_it_is_confused_with_is_in_the_catalogue(kind: type[Behaviour]) -> None:
-    known = {(place, other.effect) for other in behaviours() for place in other.places}
-    assert kind.confusable
-    for text in kind.confusable:
-        assert tuple(text.split()[:2]) in known
+    title = f"### `{kind.effect}`" + (f", law `{kind.law}`" if kind.law else "") + "\n"
+    for place in kind.places:
+        _, _, rest = PAGE.read_text(encoding="utf-8").partition(f"\n## {PLACES[place]}\n")
+        _, found, entry = rest.partition("\n## ")[0].partition(title)
+        assert found, f"docs/effects.md has no {kind.title()} among its {PLACES[place]}"
+        told = [line for line in entry.partition("\n### ")[0].splitlines() if "| `" in line]
+        assert told == ([] if place == "load" else [row(each) for each in kind.parameters()])
 
 
 def test_names_of_one_place_are_one_effect() -> None:

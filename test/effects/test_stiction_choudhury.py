@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.effects import ChoudhuryStiction, HeStiction, KanoStiction, from_mapping
-from stiction_ros.effects.behaviour import SimulatesGrid
 from stiction_ros.errors import InputError
 
 percent = st.floats(-150.0, 150.0)
@@ -175,7 +174,6 @@ def test_it_is_named_by_s_and_j() -> None:
     built = from_mapping({"effect": "stiction", "law": "choudhury", "s": 6, "j": 2})
     assert built == ChoudhuryStiction(6.0, 2.0) == ChoudhuryStiction.from_frictions(4.0, 2.0)
     assert built.to_mapping() == {"effect": "stiction", "law": "choudhury", "s": 6.0, "j": 2.0}
-    assert isinstance(built, SimulatesGrid)
 
 
 @pytest.mark.parametrize(

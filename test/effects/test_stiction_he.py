@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import SimulatesGrid
 from stiction_ros.errors import InputError
 
 percent = st.floats(-150.0, 150.0)
@@ -121,10 +120,6 @@ def test_a_grid_takes_one_start_per_point() -> None:
 
 def test_simulation_without_a_start_rests_at_the_first_value() -> None:
     assert HeStiction(5.0, 2.0).simulate(np.array([50.0, 54.0, 56.0])).tolist() == [50, 50, 54]
-
-
-def test_it_offers_a_grid() -> None:
-    assert isinstance(HeStiction(5.0, 2.0), SimulatesGrid)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@ from __future__ import annotations
 import itertools
 import math
 
-import casadi
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -31,16 +30,6 @@ def test_step_is_equations_5_and_6(
     assert SmoothedHeStiction(*friction, tau).step(stem, op)[1] == pytest.approx(
         expected, abs=1e-11
     )
-
-
-@given(frictions, smoothings, percent, percent)
-def test_the_casadi_expression_is_the_step(
-    friction: tuple[float, float], tau: float, stem: float, op: float
-) -> None:
-    law = SmoothedHeStiction(*friction, tau)
-    x, u = casadi.SX.sym("x"), casadi.SX.sym("u")
-    value = float(casadi.Function("next", [x, u], [law.expression(x, u)])(stem, op))
-    assert value == pytest.approx(law.step(stem, op)[1], abs=1e-11)
 
 
 @given(frictions, percent, percent)

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.effects import HeStiction, KanoStiction, from_mapping
-from stiction_ros.effects.behaviour import SimulatesGrid
 from stiction_ros.errors import InputError
 
 percent = st.floats(-150.0, 150.0)
@@ -134,7 +133,6 @@ def test_it_is_named_by_s_and_j() -> None:
     built = from_mapping({"effect": "stiction", "law": "kano", "s": 6, "j": 8})
     assert built == KanoStiction(6.0, 8.0)
     assert built.to_mapping() == {"effect": "stiction", "law": "kano", "s": 6.0, "j": 8.0}
-    assert isinstance(built, SimulatesGrid)
 
 
 @pytest.mark.parametrize(

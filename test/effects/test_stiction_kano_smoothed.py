@@ -3,14 +3,12 @@ from __future__ import annotations
 import itertools
 import math
 
-import casadi
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.effects import KanoStiction, SmoothedHeStiction, SmoothedKanoStiction
-from stiction_ros.effects.behaviour import SimulatesGrid
 
 percent = st.floats(-100.0, 100.0)
 bands = st.tuples(st.floats(0.0, 20.0), st.floats(0.0, 20.0))
@@ -46,20 +44,6 @@ def test_step_is_the_equations(
     expected = equations((stem, last, d), op, *pair, tau)
     assert memory == pytest.approx((expected[0], op, expected[1]), abs=1e-9)
     assert out == memory[0]
-
-
-@given(bands, smoothings, percent, percent, directions, percent)
-def test_the_casadi_expression_is_the_step(
-    pair: tuple[float, float], tau: float, stem: float, last: float, d: float, op: float
-) -> None:
-    law = SmoothedKanoStiction(*pair, tau)
-    m, u = casadi.SX.sym("m", 3), casadi.SX.sym("u")
-    after, out = law.expressions((m[0], m[1], m[2]), u)
-    function = casadi.Function("next", [m, u], [casadi.vertcat(*after), law.expression(m, u), out])
-    values = function([stem, last, d], op)
-    memory, stepped = law.step((stem, last, d), op)
-    assert np.array(values[0]).ravel() == pytest.approx(np.array(memory), abs=1e-10)
-    assert [float(values[1]), float(values[2])] == pytest.approx([stepped] * 2, abs=1e-10)
 
 
 @given(figures, exact_signals)
@@ -106,33 +90,3 @@ def test_the_stem_stays_among_its_three_modes(
     modes = (stem, op - law.dynamic_friction, op + law.dynamic_friction)
     after = law.step((stem, last, d), op)[1]
     assert min(modes) - 1e-9 <= after <= max(modes) + 1e-9
-
-
-@given(bands, smoothings, percent, percent, directions, percent)
-def test_its_gradient_is_finite(
-    pair: tuple[float, float], tau: float, stem: float, last: float, d: float, op: float
-) -> None:
-    law = SmoothedKanoStiction(*pair, tau)
-    m, u = casadi.SX.sym("m", 3), casadi.SX.sym("u")
-    gradient = casadi.gradient(law.expression(m, u), casadi.vertcat(m, u))
-    value = casadi.Function("gradient", [m, u], [gradient])([stem, last, d], op)
-    assert np.isfinite(np.array(value)).all()
-
-
-@given(st.lists(st.tuples(figures, smoothings), min_size=1, max_size=5), exact_signals)
-def test_a_grid_simulates_as_each_of_its_points(
-    points: list[tuple[tuple[float, float], float]], op: list[float]
-) -> None:
-    grid = np.array([[*pair, tau] for pair, tau in points])
-    together = SmoothedKanoStiction.simulate_grid(grid[:, :2], np.array(op), 0.0)
-    alone = [SmoothedKanoStiction(*pair).simulate(np.array(op), 0.0) for pair, _ in points]
-    assert together == pytest.approx(np.column_stack(alone), abs=1e-9)
-    first = SmoothedKanoStiction.simulate_grid(grid, np.array(op[:1]), 0.0)[0]
-    single = [
-        SmoothedKanoStiction(*row).simulate(np.array(op[:1]), 0.0)[0] for row in grid.tolist()
-    ]
-    assert first == pytest.approx(np.array(single), abs=1e-9)
-
-
-def test_it_offers_a_grid() -> None:
-    assert isinstance(SmoothedKanoStiction(6.0, 2.0), SimulatesGrid)

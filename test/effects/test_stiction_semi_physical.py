@@ -8,7 +8,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stiction_ros.effects import HeStiction, SemiPhysicalStiction, from_mapping
-from stiction_ros.effects.behaviour import SimulatesGrid
 from stiction_ros.errors import InputError
 
 percent = st.floats(-150.0, 150.0)
@@ -112,7 +111,6 @@ def test_a_grid_simulates_as_each_of_its_points(
 def test_the_published_overshoot_is_the_default() -> None:
     built = from_mapping({"effect": "stiction", "law": "semi_physical", "f_s": 5, "f_d": 2})
     assert built == SemiPhysicalStiction(5.0, 2.0, 1.99)
-    assert isinstance(built, SimulatesGrid)
     assert not isinstance(built, HeStiction)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from samples import bases, stems
 
@@ -40,7 +40,6 @@ def stem_of(cells: Cells, dynamic: float) -> FloatArray:
 
 
 @every_law
-@settings(max_examples=60, deadline=None)
 @given(seed=seeds, static=st.floats(0.05, 5.0), share=st.floats(0.0, 1.0), level=st.floats(-3, 3))
 def test_pattern_gives_the_stem_of_the_law(
     law: type[FrictionLaw], seed: int, static: float, share: float, level: float
@@ -54,7 +53,6 @@ def test_pattern_gives_the_stem_of_the_law(
 
 
 @every_law
-@settings(max_examples=60, deadline=None)
 @given(seed=seeds, static=st.floats(0.2, 4.0), share=st.floats(0.0, 1.0), level=st.floats(-2, 2))
 def test_given_its_first_slip_the_stem_is_the_same(
     law: type[FrictionLaw], seed: int, static: float, share: float, level: float
@@ -71,7 +69,6 @@ def test_given_its_first_slip_the_stem_is_the_same(
 
 
 @every_law
-@settings(max_examples=60, deadline=None)
 @given(seed=seeds, jump=st.floats(0.1, 4.0), more=st.floats(0.1, 4.0), place=st.floats(0.01, 0.99))
 def test_friction_inside_a_cell_has_its_pattern_and_none_outside(
     law: type[FrictionLaw], seed: int, jump: float, more: float, place: float

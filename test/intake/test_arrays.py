@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros import CsvColumns, InputError, Record, read
@@ -27,7 +27,6 @@ class Frame(dict[str, Any]):
         self.columns, self.index = list(columns), index
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     count=st.integers(4, 40),

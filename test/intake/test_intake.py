@@ -4,7 +4,7 @@ import gzip
 import tempfile
 from pathlib import Path
 
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from stiction_ros.intake import IntakeOptions, loops
@@ -60,7 +60,6 @@ def outcomes(content: bytes, suffix: str, options: IntakeOptions) -> None:
             assert len(loop.summary.splitlines()) == 1
 
 
-@settings(max_examples=100, deadline=None)
 @example(
     header=["OP", "PV"],
     body=[["0"], ["0", "F1.OP"], ["0", "F1.OP"]],
@@ -90,7 +89,6 @@ def test_any_table_is_loops_or_one_clear_line_each(
     outcomes(text.encode(), ".csv", options)
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.binary(max_size=300), st.sampled_from([".csv", ".gz", ".zst", ".xlsx", ".parquet"]))
 def test_any_bytes_are_loops_or_one_clear_line_each(content: bytes, suffix: str) -> None:
     for start in (

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
@@ -82,7 +82,6 @@ def test_iso_stamps(tmp_path: Path, first: str, second: str) -> None:
     assert abs(record.start - begin) <= 0.5
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     st.lists(
         st.tuples(*[st.floats(-1e300, 1e300).filter(lambda value: value not in SENTINELS)] * 3),
@@ -112,7 +111,6 @@ def test_round_trip(  # differences of values are finite
     np.testing.assert_array_equal(got, np.array(rows))
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.text(max_size=200))
 def test_any_text_is_a_record_or_one_clear_line(text: str) -> None:
     with tempfile.TemporaryDirectory() as folder:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -48,7 +48,6 @@ def test_other_names_say_nothing(name: str) -> None:
     assert read_tag(name) is None
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(st.sampled_from(["good", "Bad", "", "-9999"]), min_size=40, max_size=80))
 def test_no_value_is_lost_or_made_up(kinds: list[str]) -> None:
     """Every sample is the one given, or held or bad, whatever stands in the cells."""

@@ -100,13 +100,8 @@ def run_core(name: str) -> LiveRun:
     )
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(case, marks=[] if case in ("serviced", "kano") else pytest.mark.trial)
-        for case in CASES
-    ],
-)
+@pytest.mark.trial
+@pytest.mark.parametrize("name", CASES)
 def test_the_graph_does_what_the_core_does_from_estimate_to_swap(name: str) -> None:
     graph, twin = run_graph(name), run_core(name)
     try:

@@ -9,7 +9,7 @@ import pytest
 from plant_process import PlantProcess
 
 from stiction_ros.cli.main import main
-from stiction_ros.opcua.browsing import TagNames, loops_of
+from stiction_ros.opcua.browsing import loops_of
 from stiction_ros.opcua.tag_map import TagMap
 from stiction_studies.control_system.tags import NAMESPACE
 
@@ -53,7 +53,7 @@ def test_names_that_nothing_bears_are_said(
 
 def test_groups_become_names_that_topics_bear() -> None:
     found = {("10-FIC 7", "pv"): "i=1", ("10-FIC 7", "Out"): "i=2", ("X", "PV"): "i=3"}
-    (loop,) = loops_of(found, TagNames(), 1.0)
+    (loop,) = loops_of(found, {"pv": "PV", "op": "OUT"}, 1.0)
     assert loop["loop"] == "L10_FIC_7"
 
 

@@ -11,9 +11,9 @@ from small_maps import ALIVE, BEAT, MODE, OP, PV, ROUT, SP, bad, good, loop_tags
 from stiction_ros.online.input.op_port import Reception
 from stiction_ros.opcua.grant import GrantState
 from stiction_ros.opcua.heartbeat import HeardBeat, OwnBeat, identity_of
-from stiction_ros.opcua.loop_bridge import BridgeRules, LoopBridge, OrderKind, WriteOrder, mode_text
+from stiction_ros.opcua.loop_bridge import BridgeRules, LoopBridge, WriteOrder, mode_text
 from stiction_ros.opcua.reading import TagQuality, TagReading
-from stiction_ros.opcua.tag_map import ValveTags
+from stiction_ros.opcua.tag_map import Use, ValveTags
 
 SENDER = "/unit/controller"
 RULES = BridgeRules(writes=True, asks=True, commander=SENDER, identity=3)
@@ -33,7 +33,7 @@ class Plant:
         self.linked = True
         self.refuses = ""
         self.took = 0.01
-        self.unanswered: set[OrderKind] = set()  # what is never told to have been written
+        self.unanswered: set[Use] = set()  # what is never told to have been written
         self.orders: list[WriteOrder] = []
         for tag, value in ((PV, 10.0), (SP, 10.0), (OP, self.op), (MODE, self.mode)):
             self.hear(tag, good(value, -0.1, first=True))
@@ -47,7 +47,7 @@ class Plant:
             self.orders.append(order)
             if order.kind in self.unanswered:
                 continue
-            if order.kind is OrderKind.OP and not self.refuses:
+            if order.kind is Use.OP and not self.refuses:
                 self.op = order.values[0][1]
                 self.hear(OP, good(self.op, self.now))
             self.do(self.bridge.written(order, self.refuses, self.took, self.now))
@@ -81,10 +81,10 @@ class Plant:
         return self
 
     def ops(self) -> list[float]:
-        return [order.values[0][1] for order in self.orders if order.kind is OrderKind.OP]
+        return [order.values[0][1] for order in self.orders if order.kind is Use.OP]
 
     def requests(self) -> list[float]:
-        return [order.values[0][1] for order in self.orders if order.kind is OrderKind.REQUEST]
+        return [order.values[0][1] for order in self.orders if order.kind is Use.REQUEST]
 
 
 def test_listening_writes_nothing_whatever_is_asked() -> None:
@@ -100,7 +100,7 @@ def test_nothing_but_request_and_beat_is_written_before_the_grant() -> None:
     plant = Plant()
     plant.run(20)
     assert plant.requests() == [1.0]
-    assert {order.kind for order in plant.orders} == {OrderKind.REQUEST, OrderKind.BEAT}
+    assert {order.kind for order in plant.orders} == {Use.REQUEST, Use.BEAT}
 
 
 def test_op_begins_where_it_is_and_moves_at_the_rate() -> None:
@@ -143,7 +143,7 @@ def test_op_never_leaves_its_limits() -> None:
 
 def test_an_op_that_is_not_taken_in_time_ends_the_grant() -> None:
     plant = Plant().granted()
-    plant.unanswered.add(OrderKind.OP)
+    plant.unanswered.add(Use.OP)
     plant.run(1)
     written = len(plant.ops())
     assert plant.bridge.grant.may_write
@@ -155,7 +155,7 @@ def test_an_op_that_is_not_taken_in_time_ends_the_grant() -> None:
 
 def test_the_mode_is_asked_for_at_the_moment_of_writing() -> None:
     plant = Plant().granted()
-    order = next(order for order in plant.orders if order.kind is OrderKind.OP)
+    order = next(order for order in plant.orders if order.kind is Use.OP)
     assert (order.modes, order.granted) == ((MODE,), ("ROUT",))
     assert order.values[0][0] == ROUT
 
@@ -263,7 +263,7 @@ def test_it_can_be_asked_for_again() -> None:
 
 def test_a_request_that_is_still_being_taken_back_is_not_made_anew() -> None:
     plant = Plant().granted()
-    plant.unanswered.add(OrderKind.REQUEST)
+    plant.unanswered.add(Use.REQUEST)
     plant.set_mode("AUTO")
     assert plant.orders[-1].values[0][1] == 0.0
     taking_back = plant.orders[-1]

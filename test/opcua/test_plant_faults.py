@@ -25,10 +25,11 @@ from plant_process import BUDGET, PlantProcess, wait_until
 from stiction_ros.cli.main import main
 from stiction_ros.opcua import session
 from stiction_ros.opcua.grant import GrantState
-from stiction_ros.opcua.loop_bridge import OrderKind, WriteOrder
+from stiction_ros.opcua.loop_bridge import WriteOrder
 from stiction_ros.opcua.plant_link import LinkSettings, PlantLink, Written
 from stiction_ros.opcua.security import Credentials, fingerprint, load_certificate
 from stiction_ros.opcua.session import open_client
+from stiction_ros.opcua.tag_map import Use
 from stiction_studies.faults.bridge.relay import Relay
 
 pytestmark = pytest.mark.alone
@@ -160,6 +161,7 @@ def test_bad_quality(trial: Trial) -> None:
     trial.judge()
 
 
+@pytest.mark.trial
 def test_stamps_in_the_past(trial: Trial) -> None:
     runner = trial.granted()
     trial.disturb("PAST", 86_400.0)
@@ -186,6 +188,7 @@ def test_the_controller_is_gone(trial: Trial) -> None:
     trial.judge()
 
 
+@pytest.mark.trial
 def test_a_thousand_changes_a_second(trial: Trial) -> None:
     runner = trial.granted()
     trial.disturb("BURST", 50.0)  # of two tags, ten times a second
@@ -197,6 +200,7 @@ def test_a_thousand_changes_a_second(trial: Trial) -> None:
     trial.judge()
 
 
+@pytest.mark.trial
 def test_a_server_that_is_slow_by_two_seconds(trial: Trial) -> None:
     runner = trial.granted()
     trial.disturb("DELAY", 2.0)
@@ -286,7 +290,14 @@ def test_a_user_without_rights(trial: Trial) -> None:
     assert trial.ops() == []
 
 
-@pytest.mark.parametrize("kind", ["server", "stranger", "expired", "word"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "server",
+        "expired",
+        *(pytest.param(k, marks=pytest.mark.trial) for k in ("stranger", "word")),
+    ],
+)
 def test_what_cannot_be_trusted_gets_no_session(
     trial: Trial, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -331,24 +342,25 @@ def test_a_connection_that_is_closed_at_once_is_not_waited_for(
 def test_a_request_goes_before_what_its_loop_waits_to_write() -> None:
     link = PlantLink(LinkSettings("opc.tcp://127.0.0.1:1", Credentials(security="none"), ()))
 
-    def order(loop: str, kind: OrderKind) -> WriteOrder:
+    def order(loop: str, kind: Use) -> WriteOrder:
         return WriteOrder(loop, kind, (("s=X", 0.0),), 1e9)
 
-    for loop, kind in (("A", OrderKind.BEAT), ("B", OrderKind.BEAT), ("A", OrderKind.OP)):
+    for loop, kind in (("A", Use.BEAT), ("B", Use.BEAT), ("A", Use.OP)):
         link._put(order(loop, kind))
-    link._put(order("A", OrderKind.REQUEST))
-    link._put(order("A", OrderKind.REQUEST))  # one request does not drop another
+    link._put(order("A", Use.REQUEST))
+    link._put(order("A", Use.REQUEST))  # one request does not drop another
     left = [link._orders.get_nowait() for _ in range(link._orders.qsize())]
     assert [(one.loop, one.kind) for one in left] == [
-        ("B", OrderKind.BEAT),
-        ("A", OrderKind.REQUEST),
-        ("A", OrderKind.REQUEST),
+        ("B", Use.BEAT),
+        ("A", Use.REQUEST),
+        ("A", Use.REQUEST),
     ]
     told = [event for event in link.drain() if isinstance(event, Written)]
-    assert [event.order.kind for event in told] == [OrderKind.BEAT, OrderKind.OP]
+    assert [event.order.kind for event in told] == [Use.BEAT, Use.OP]
     assert all(event.failure for event in told)
 
 
+@pytest.mark.trial
 def test_the_server_is_killed_and_starts_again(trial: Trial) -> None:
     plant = trial.plant
     runner = trial.granted()

@@ -12,7 +12,7 @@ from small_maps import BEAT, MODE, OP, PV, REQUEST, ROUT, SP, good, loop_tags
 from small_server import SPACE, SmallServer
 
 from stiction_ros.opcua.grant import GrantState
-from stiction_ros.opcua.loop_bridge import BridgeRules, LoopBridge, OrderKind, WriteOrder
+from stiction_ros.opcua.loop_bridge import BridgeRules, LoopBridge, WriteOrder
 from stiction_ros.opcua.plant_link import (
     Heard,
     Linked,
@@ -107,8 +107,8 @@ def test_a_written_tag_that_is_not_there_is_named_and_the_others_are_written(
     assert (told.read, told.written) == ({}, {wrong: UNKNOWN})
     until = time.monotonic() + 60.0
     orders = [
-        WriteOrder("A", OrderKind.OP, ((wrong, 50.0),), until),
-        WriteOrder("B", OrderKind.REQUEST, ((request, 1.0),), until),
+        WriteOrder("A", Use.OP, ((wrong, 50.0),), until),
+        WriteOrder("B", Use.REQUEST, ((request, 1.0),), until),
     ]
     listener.link.submit(orders)
     listener.wait_for(lambda event: isinstance(event, Written) and event.order.loop == "B")
@@ -128,7 +128,7 @@ def test_a_node_under_two_spellings_is_written_for_the_first_loop_only(
     assert told.written == {second: f"is the node of {first}, which is written already"}
     until = time.monotonic() + 60.0
     for loop, tag, op in (("A", first, 50.0), ("B", second, 60.0)):
-        listener.link.submit([WriteOrder(loop, OrderKind.OP, ((tag, op),), until)])
+        listener.link.submit([WriteOrder(loop, Use.OP, ((tag, op),), until)])
     listener.wait_for(lambda event: isinstance(event, Written) and event.order.loop == "B")
     assert server.value("OP") == 50.0
 
@@ -139,7 +139,7 @@ def test_a_written_tag_of_a_type_that_does_not_fit_is_refused_before_anything_is
     kinds = {"TEXT": ("flow", "String"), "FLAG": (False, "Boolean"), "SHORT": (0, "Int16")}
     for name, (value, kind) in kinds.items():
         server.add(name, value, kind)
-    written = {"ns=2;s=TEXT": Use.OP, "ns=2;s=FLAG": Use.REQUEST, "ns=2;s=SHORT": Use.HEARTBEAT}
+    written = {"ns=2;s=TEXT": Use.OP, "ns=2;s=FLAG": Use.REQUEST, "ns=2;s=SHORT": Use.BEAT}
     listener = listen(("ns=2;s=PV",), written)
     listener.wait_for(lambda event: isinstance(event, Linked) and event.connected)
     (told,) = listener.refused()

@@ -68,17 +68,9 @@ def test_a_secret_that_others_may_read_is_refused(tmp_path: Path, credentials: C
         check_secret_file(tmp_path / "folder")
 
 
-def test_a_password_may_stand_in_the_environment(
-    credentials: Credentials, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    told = dataclasses.replace(credentials, password_file="", password_variable="PLANT_WORD")
-    with pytest.raises(InputError, match="PLANT_WORD"):
-        told.check(writes=True)
-    monkeypatch.setenv("PLANT_WORD", "from there")
-    assert told.password() == "from there"
-    both = dataclasses.replace(credentials, password_variable="PLANT_WORD")
-    with pytest.raises(InputError, match="one of"):
-        both.password()
+def test_a_user_without_a_password_is_refused(credentials: Credentials) -> None:
+    with pytest.raises(InputError, match="password_file is needed"):
+        dataclasses.replace(credentials, password_file="").check(writes=True)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import simulated_loops as loops
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.paper.programme.apparent_stiction import (
@@ -15,7 +15,6 @@ from stiction_ros.paper.programme.apparent_stiction import (
 )
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     long=st.floats(0.5, 20.0),
     share=st.floats(0.1, 0.95),

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import simulated_loops as loops
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
@@ -15,7 +15,6 @@ from stiction_ros.signals.arx_fit import ArxOrders, fit_arx, stable_arx
 TRUTH = np.array([[5.0, 2.0]])
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 1000),
     na=st.integers(1, 4),

@@ -105,7 +105,7 @@ def test_the_printed_method_is_no_better_than_the_one_at_its_best(found: Identif
     assert found.search.squared_error <= printed.search.squared_error
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(static=st.floats(0.0, 8.0), share=st.floats(0.0, 1.0))
 def test_without_the_coefficients_it_is_the_same_criterion(static: float, share: float) -> None:
     record, friction = short(), np.array([[static, share * static]])

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
@@ -96,7 +96,6 @@ def test_observer_form_is_the_difference_equation(equation: ArxOutput, seed: int
 
 
 @given(st.data(), st.integers(0, 2**32 - 1))
-@settings(max_examples=50)
 def test_mimo_outputs_are_their_equations_side_by_side(data: st.DataObject, seed: int) -> None:
     valves = ("V1", "V2", "V3")
     equations = tuple(data.draw(arx_outputs(name, valves)) for name in ("Y1", "Y2"))
@@ -129,7 +128,6 @@ def test_a_delay_shows_the_first_reaction_at_sample_1_plus_delay() -> None:
 
 
 @given(arx_outputs(), st.floats(-20.0, 20.0))
-@settings(max_examples=50)
 def test_rest_at_a_steady_state_stays_there(equation: ArxOutput, stem: float) -> None:
     # |a| sums to at most 1.2; keep to those that have one steady state and are stable.
     if sum(abs(a) for a in equation.a) > 0.9:

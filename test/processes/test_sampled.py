@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete, lfilter
 
@@ -20,7 +20,6 @@ def response(of: Channel) -> np.ndarray:
     return np.asarray(lfilter([*np.zeros(1 + delay), *b], a, np.ones(SAMPLES)))
 
 
-@settings(max_examples=30, deadline=None)
 @given(
     gain=st.floats(-5.0, 5.0),
     lag=st.floats(0.3, 100.0),

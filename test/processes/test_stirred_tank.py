@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -41,7 +41,6 @@ def test_a_steady_state_does_not_move(first: float, second: float) -> None:
 
 
 @given(valve, valve, st.floats(5.0, 10.0), st.floats(20.0, 80.0))
-@settings(max_examples=25, deadline=None)
 def test_a_sample_is_the_solution_of_a1(first: float, second: float, c: float, t: float) -> None:
     stem, start = np.array([first, second]), np.array([c, t])
     exact = solve_ivp(

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
 from stiction_ros.records.bag.writer import BagWriter
+from stiction_ros.records.parts import only_part
+from stiction_ros.records.record import Record
+from stiction_ros.records.run.bag_reader import read_bag_parts
 from stiction_ros.records.storage.bag_metadata import LATCHED, Qos
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 JOINT_STATE = "sensor_msgs/msg/JointState"
 SECOND = 10**9
+
+
+def read_bag(path: Path, namespace: str | None = None) -> Record:
+    """Return the one record of a loop in a bag."""
+    return only_part(read_bag_parts(path, namespace=namespace), str(path))
 
 
 def message(type_name: str, *fields: object) -> object:

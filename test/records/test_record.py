@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
@@ -16,9 +16,8 @@ from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.csv_writer import write_csv
 from stiction_ros.records.parts import joined, longest_part, only_part
 from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Record
+from stiction_ros.records.record import Gap, Record, Segment
 from stiction_ros.records.run.bag_reader import read_bag_parts
-from stiction_ros.records.segment import Gap, Segment
 from stiction_studies.as_given import read_csv_parts
 
 G, H, B, M = Quality.GOOD, Quality.HELD, Quality.BAD, Quality.MANUAL
@@ -104,7 +103,6 @@ records = st.integers(2, 30).flatmap(
 )
 
 
-@settings(max_examples=60, deadline=None)
 @given(records)
 def test_segments_cover_every_sample_once_and_usable_rows_all_that_is_usable(found: Record) -> None:
     covered = [row for first, last, _ in found.segments for row in range(first, last)]
@@ -118,7 +116,6 @@ def test_segments_cover_every_sample_once_and_usable_rows_all_that_is_usable(fou
         assert part.segments == (Segment(0, len(part), part.start),)
 
 
-@settings(max_examples=60, deadline=None)
 @given(records, st.data())
 def test_a_part_of_a_part_is_a_part(found: Record, data: st.DataObject) -> None:
     count = len(found)
@@ -133,7 +130,6 @@ def test_a_part_of_a_part_is_a_part(found: Record, data: st.DataObject) -> None:
     np.testing.assert_allclose(once.time + once.start, (found.time + found.start)[b:c])
 
 
-@settings(max_examples=60, deadline=None)
 @given(records)
 def test_filled_has_every_sample_at_its_time(found: Record) -> None:
     filled, rows = found.filled(), found.filled_rows()
@@ -148,7 +144,6 @@ def test_filled_has_every_sample_at_its_time(found: Record) -> None:
         np.testing.assert_allclose(filled.time[rows], found.time)
 
 
-@settings(max_examples=100, deadline=None)
 @given(records)
 def test_parts_joined_are_the_record(found: Record) -> None:
     pieces = [found.part(first, last) for first, last, _ in found.segments]
@@ -158,7 +153,6 @@ def test_parts_joined_are_the_record(found: Record) -> None:
     np.testing.assert_array_equal(again.pv, found.pv)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(st.sampled_from(Quality), min_size=3, max_size=30))
 def test_the_mask_goes_through_a_csv_file(mask: list[Quality]) -> None:
     found = record(mask, count=len(mask))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
@@ -80,7 +80,6 @@ times = st.lists(st.floats(0.01, 20.0), min_size=1, max_size=60).map(
 )
 
 
-@settings(max_examples=100, deadline=None)
 @given(times)
 def test_stretches_cover_every_row_once(times: np.ndarray) -> None:
     edges = split_at_gaps(times)

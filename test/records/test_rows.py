@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stiction_ros.records.record import Record
@@ -43,7 +43,6 @@ def places_with_holes(count: int, missing: int, random: np.random.Generator) -> 
     return np.delete(np.arange(count), random.choice(np.arange(1, count - 1), missing, False))
 
 
-@settings(max_examples=60, deadline=None)
 @given(counts, scans, jitters, st.integers(0, 4), seeds)
 def test_rows_that_jitter_about_their_time(
     count: int, scan: float, jitter: float, missing: int, seed: int
@@ -54,7 +53,6 @@ def test_rows_that_jitter_about_their_time(
     kept(scan * (places + 0.98 * random.uniform(-jitter, jitter, len(places))), places)
 
 
-@settings(max_examples=60, deadline=None)
 @given(counts, scans, jitters, st.integers(0, 4), seeds)
 def test_rows_whose_steps_jitter(
     count: int, scan: float, jitter: float, missing: int, seed: int
@@ -65,14 +63,12 @@ def test_rows_whose_steps_jitter(
     kept(scan * np.cumsum(steps)[places], places)
 
 
-@settings(max_examples=30, deadline=None)
 @given(counts, scans, jitters)
 def test_a_scan_that_alternates(count: int, scan: float, jitter: float) -> None:
     places = np.arange(count)
     kept(scan * np.cumsum(np.where(places % 2, 1.0 + jitter, 1.0 - jitter)), places)
 
 
-@settings(max_examples=60, deadline=None)
 @given(counts, scans, st.integers(1, 10), st.floats(0.05, 0.7), st.integers(0, 4), seeds)
 def test_rows_that_come_late(
     count: int, scan: float, late: int, by: float, missing: int, seed: int
@@ -91,7 +87,6 @@ def test_rows_that_come_late_together() -> None:
     kept(times, np.arange(300))
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(1000, 1500), st.floats(1.03, 1.7), st.sampled_from([0.01, 1.0, 60.0]), seeds)
 def test_stamps_with_too_few_digits(count: int, scan: float, digit: float, seed: int) -> None:
     places = np.arange(count)
@@ -100,7 +95,6 @@ def test_stamps_with_too_few_digits(count: int, scan: float, digit: float, seed:
     assert record.notes[0].startswith("stamps are rounded") or scan > 1.9
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.sampled_from([1.1, 1.25, 1.3, 1.6, 2.3]), st.integers(1, 3), seeds)
 def test_missing_rows_among_stamps_with_too_few_digits(
     scan: float, missing: int, seed: int
@@ -114,7 +108,6 @@ def test_missing_rows_among_stamps_with_too_few_digits(
     np.testing.assert_array_equal(2.0 * record.op[record.measured], record.pv[record.measured])
 
 
-@settings(max_examples=60, deadline=None)
 @given(counts, st.integers(4, 25), seeds)
 def test_missing_rows_alone_are_no_rounding(count: int, missing: int, seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from bag_making import JOINT_STATE, SECOND, Bag, joint_state
+from bag_making import JOINT_STATE, SECOND, Bag, joint_state, read_bag
 
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
 from stiction_ros.records.quality import Quality
-from stiction_ros.records.run.bag_reader import read_bag, read_bag_parts
+from stiction_ros.records.run.bag_reader import read_bag_parts
 from stiction_ros.records.run.log import read_run
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "identification"))

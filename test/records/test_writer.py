@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
@@ -61,7 +61,6 @@ def records(draw: st.DrawFn) -> Record:
 
 
 @given(records())
-@settings(max_examples=50, deadline=None)
 def test_what_is_written_is_read_back_without_naming_a_column(written: Record) -> None:
     with tempfile.TemporaryDirectory() as folder:
         write_csv(written, Path(folder) / "r.csv")

@@ -9,7 +9,8 @@ import pytest
 
 from stiction_ros.loop import LoopModel
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.log import Estimate, Fit, ModeChange, RunLog, Text
+from stiction_ros.records.run.events import Estimate, Fit, ModeChange, Text
+from stiction_ros.records.run.log import RunLog
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "survey"))
 

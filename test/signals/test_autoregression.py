@@ -29,7 +29,7 @@ def drawn(seed: int, *shape: int) -> FloatArray:
 
 
 @given(st.lists(st.floats(-0.9, 0.9), min_size=0, max_size=4), st.integers(0, 100))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_whitening_undoes_colouring(ar: list[float], seed: int) -> None:
     noise = np.random.default_rng(seed).standard_normal((50, 2))
     shaped = coloured(noise, np.array(ar))
@@ -63,7 +63,6 @@ def test_white_noise_needs_no_memory() -> None:
 
 
 @given(SEEDS, st.floats(-0.95, 0.95))
-@settings(max_examples=25, deadline=None)
 def test_autoregression_solves_the_normal_equations(seed: int, first: float) -> None:
     residual = np.asarray(lfilter([1.0], [1.0, -first, 0.3], drawn(seed, COUNT)))
     phi = best_autoregression(residual, TRAIN, 6)[0]
@@ -74,7 +73,6 @@ def test_autoregression_solves_the_normal_equations(seed: int, first: float) -> 
 
 
 @given(SEEDS)
-@settings(max_examples=25, deadline=None)
 def test_the_order_is_the_one_of_least_bic(seed: int) -> None:
     residual = np.asarray(lfilter([1.0], [1.0, -0.5, 0.0, 0.2], drawn(seed, COUNT)))
     late = [np.concatenate([np.zeros(k), residual[: COUNT - k]])[TRAIN] for k in range(7)]

@@ -41,7 +41,7 @@ def test_a_pi_controller_is_recovered_exactly(lag: int, gain: float) -> None:
 
 
 @given(seed=st.integers(0, 20))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_rounded_signals_leave_the_controller(seed: int) -> None:
     record = known(STICKY, seed).record
     found = recovered(
@@ -72,7 +72,7 @@ def test_a_set_point_that_is_not_recorded_is_found() -> None:
     pv=st.floats(0.01, 100.0).map(lambda size: size if size > 1.0 else -size),
     shift=st.floats(-100.0, 100.0),
 )
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_units_change_nothing_but_the_gain(op: float, pv: float, shift: float) -> None:
     record = known(STICKY).record
     assert record.sp is not None

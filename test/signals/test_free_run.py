@@ -20,7 +20,7 @@ def inputs(seed: int, count: int = 80) -> list[np.ndarray]:
 
 
 @given(st.integers(0, 1000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_free_run_obeys_its_equation(seed: int) -> None:
     x, past = inputs(seed), np.array([3.0, -2.0])
     y = np.concatenate([past, recursion(np.append(1.0, A), driven(B, DELAYS, x, 0.2)[2:], past)])

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.signals.oscillation import (
@@ -21,7 +21,6 @@ def wave(size: float, period: float, samples: int) -> np.ndarray:
     return size * np.sin(2 * np.pi * np.arange(samples) / period + 0.3)
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     period=st.floats(10.0, 80.0),
     size=st.floats(0.01, 50.0),

@@ -28,7 +28,7 @@ def sine(size: float, period: float) -> np.ndarray:
     return size * np.sin(2 * np.pi * np.arange(COUNT) / period)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(period=st.floats(12.0, 120.0), seed=st.integers(0, 50), off=st.floats(-0.8, 0.8))
 def test_a_wave_from_outside_is_found_near_its_period(period: float, seed: int, off: float) -> None:
     wave = np.sign(sine(1.0, period)) * 0.3
@@ -52,7 +52,7 @@ def test_there_is_no_line_in_noise(seed: int) -> None:
 
 @given(scale=st.floats(0.01, 100.0), shift=st.floats(-100.0, 100.0))
 @example(scale=0.01, shift=47.0)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_units_change_no_gain(scale: float, shift: float) -> None:
     signal = moved(sine(0.3, 50.0))
     other = Predicted(signal.y * scale + shift, [shift - x / scale for x in signal.inputs], [3])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.signals.spectral_lines import (
@@ -31,7 +31,6 @@ def energy(columns: np.ndarray, plain: np.ndarray, left: np.ndarray) -> float:
 
 
 @given(st.integers(0, 1000), st.integers(20, 480))
-@settings(max_examples=25, deadline=None)
 def test_a_line_takes_what_least_squares_does(seed: int, line: int) -> None:
     plain, left = drawn(seed)
     columns = waves_of(2.0 * np.pi * line / LENGTH * np.arange(COUNT), 1)
@@ -40,7 +39,6 @@ def test_a_line_takes_what_least_squares_does(seed: int, line: int) -> None:
 
 
 @given(st.integers(0, 1000), st.floats(0.02, 0.15))
-@settings(max_examples=25, deadline=None)
 def test_harmonics_take_one_after_the_other(seed: int, frequency: float) -> None:
     plain, left = drawn(seed)
     angle = 2.0 * np.pi * frequency * np.arange(COUNT)

@@ -25,6 +25,17 @@ EARLIER = (
 
 COLUMNS = {"now": GAIN["now"], **{option["what"]: option for option in GAIN["options"]}}
 
+WIDE, NARROW = 1400, 390  # px
+both_ways = pytest.mark.parametrize(
+    ("width", "dark"),
+    [
+        (WIDE, False),
+        (NARROW, True),
+        pytest.param(WIDE, True, marks=pytest.mark.trial),
+        pytest.param(NARROW, False, marks=pytest.mark.trial),
+    ],
+)
+
 
 def _survey() -> Survey:
     rows = [
@@ -57,8 +68,7 @@ def loop_file(tmp_path: Path) -> Path:
 
 
 @needs_browser
-@pytest.mark.parametrize("dark", [False, True])
-@pytest.mark.parametrize("width", [1400, 390])
+@both_ways
 def test_the_list_is_readable(list_file: Path, width: int, dark: bool) -> None:
     seen = probe(list_file, width, dark=dark)
     check(seen, width, dark)
@@ -67,7 +77,7 @@ def test_the_list_is_readable(list_file: Path, width: int, dark: bool) -> None:
 
 
 @needs_browser
-@pytest.mark.parametrize("width", [1400, 390])
+@pytest.mark.parametrize("width", [NARROW, pytest.param(WIDE, marks=pytest.mark.trial)])
 def test_a_list_with_all_columns_and_the_longest_words_is_readable(
     tmp_path: Path, width: int
 ) -> None:
@@ -91,8 +101,7 @@ def test_a_list_with_all_columns_and_the_longest_words_is_readable(
 
 
 @needs_browser
-@pytest.mark.parametrize("dark", [False, True])
-@pytest.mark.parametrize("width", [1400, 390])
+@both_ways
 def test_the_page_of_a_loop_is_readable(loop_file: Path, width: int, dark: bool) -> None:
     seen = probe(loop_file, width, dark=dark)
     check(seen, width, dark)
@@ -101,8 +110,7 @@ def test_the_page_of_a_loop_is_readable(loop_file: Path, width: int, dark: bool)
 
 
 @needs_browser
-@pytest.mark.parametrize("width", [1400, 390])
-def test_the_list_sorts_filters_and_searches(list_file: Path, width: int) -> None:
+def test_the_list_sorts_filters_and_searches(list_file: Path) -> None:
     act = """
       const names = () => [...document.querySelectorAll("table.list tbody tr")]
         .filter(row => !row.hidden).map(row => row.querySelector(".name").innerText);
@@ -117,7 +125,7 @@ def test_the_list_sorts_filters_and_searches(list_file: Path, width: int) -> Non
       const seen = box.right <= innerWidth && box.width;
       return { up, down, healthy, searched, all: names().length, seen };
     """
-    acted = probe(list_file, width, dark=False, act=act)["acted"]
+    acted = probe(list_file, NARROW, dark=False, act=act)["acted"]
     assert acted["seen"] > 20
     assert acted["up"][0] == "LIC7"
     assert acted["down"][0] == "<b>TIC</b>"

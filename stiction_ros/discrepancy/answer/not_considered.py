@@ -14,7 +14,7 @@ ALONE = (
     "samples of {name} that stand alone, {count} of them, were left out before the search: what "
     "shows only there is not searched"
 )
-ABSORBED = "the process is fitted anew, which does as well"
+ABSORBED = "the process was fitted to these records, which does as well"
 NO_ROOM = (
     "these records cannot show it: no signal moves where it acts, or no size of it is possible"
 )

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple, Protocol, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
-from stiction_ros.effects import Axis, Behaviour, FloatArray, Parameter, Seen, about
-from stiction_ros.effects.behaviour import BoolArray, SimulatesGrid
+from stiction_ros.effects import Axis, Behaviour, FloatArray, Seen, about
+from stiction_ros.effects.behaviour import BoolArray
 
 _RANKED = 200  # points of a grid that may be among the best ones
 _NEIGHBOURS = 1.5  # steps of the first grid
@@ -56,23 +56,6 @@ class Response:
     def impossible(self) -> bool:
         """Whether no point is possible."""
         return self.possible is not None and not self.possible.any()
-
-
-class GridBehaviour(SimulatesGrid, Protocol):
-    """What a candidate needs of a behaviour: whole grids at once, and one by its figures."""
-
-    effect: ClassVar[str]
-    law: ClassVar[str | None]
-
-    @classmethod
-    def parameters(cls) -> tuple[Parameter, ...]:
-        """Return the parameters in the order of the grid's columns."""
-        ...
-
-    @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> Behaviour:
-        """Return the behaviour with the given values by key."""
-        ...
 
 
 class Identity(NamedTuple):

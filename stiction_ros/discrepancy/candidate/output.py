@@ -10,7 +10,6 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import (
     Candidate,
-    GridBehaviour,
     Response,
     lag_axis,
     lasts,
@@ -58,12 +57,10 @@ class FilterCandidate(OutputCandidate):
         kind: the behaviour; its first figure is searched.
     """
 
-    kind: type[GridBehaviour]
+    kind: type[Behaviour]
 
     @classmethod
-    def of(
-        cls, run: FreeRun, output: int, kind: type[GridBehaviour], axes: tuple[Axis, ...]
-    ) -> Self:
+    def of(cls, run: FreeRun, output: int, kind: type[Behaviour], axes: tuple[Axis, ...]) -> Self:
         """Return the candidate of an output by its index, with the figures that are searched."""
         place = f"process:{run.model.outputs[output]}"
         return cls(place=place, effect=kind.effect, axes=axes, output=output, kind=kind)

@@ -11,7 +11,6 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import (
     Candidate,
-    GridBehaviour,
     Response,
     lag_axis,
     lasts,
@@ -60,12 +59,10 @@ class ValveCandidate(Candidate):
     """
 
     valve: int
-    kind: type[GridBehaviour]
+    kind: type[Behaviour]
 
     @classmethod
-    def at(
-        cls, run: FreeRun, valve: int, kind: type[GridBehaviour], axes: tuple[Axis, ...]
-    ) -> Self:
+    def at(cls, run: FreeRun, valve: int, kind: type[Behaviour], axes: tuple[Axis, ...]) -> Self:
         """Return the candidate at a valve by its index, with the figures that are searched."""
         return cls(
             place=f"valve:{run.model.valves[valve].name}",
@@ -256,7 +253,7 @@ class CubicCandidate(ValveCandidate):
 
     @property
     def absorbed(self) -> bool:
-        """Left out beside a free process, which has a slope of its own."""
+        """Left out beside a fitted process, which has a slope of its own."""
         return True
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:

@@ -1,1 +1,1 @@
-"""The process fitted anew behind the effects, where it is not given."""
+"""The process where it is not given or not right: identified, fitted again, changed."""

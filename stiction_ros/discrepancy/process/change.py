@@ -20,7 +20,7 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.processes import ArxProcess
 from stiction_ros.signals.autoregression import whiten
 
-STEPS = 5
+STEPS = 10
 TINY_STEP = 0.02  # of the probes, at which it has settled
 SURE = 2.5  # standard errors by which a figure has to be another than the model's
 NORMAL = 1.96
@@ -49,6 +49,23 @@ class ProcessChange:
     interval: tuple[float, float]
     unit: str
     model: float | None = None
+
+    @property
+    def sentence(self) -> str:
+        """What it says, for people, such as ``dead time 2 s shorter than in the model``."""
+        low, high = self.interval
+        if self.what == "delay":
+            side = "longer" if self.value > 0.0 else "shorter"
+            low, high = sorted((abs(low), abs(high)))
+            said = f"dead time {abs(self.value):.3g} s {side} than in the model"
+            return f"{said} (95 % between {low:.3g} and {high:.3g} s)"
+        if self.model is None:
+            said = f"gain {self.value:.3g} times that of the model"
+            return f"{said} (95 % between {low:.3g} and {high:.3g})"
+        kind = "lead" if self.what == "lead" else "time constant"
+        now, low, high = (self.model * each for each in (self.value, low, high))
+        said = f"{kind} {now:.3g} s, in the model {self.model:.3g} s"
+        return f"{said} (95 % between {low:.3g} and {high:.3g} s)"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of ``process_changes`` in ``gap --json``."""

@@ -83,30 +83,6 @@ def process_with(process: Process, equations: Sequence[Equation], sample_time: f
     return ArxProcess(tuple(outputs), process.valves, process.model.stem0, process.model.pv0)
 
 
-def without_noise(model: LoopModel) -> LoopModel:
-    """Return the model with no noise declared: that of a first fit is a guess, no declaration."""
-    return with_noise_of(model, None)
-
-
-def with_noise_of(model: LoopModel, other: LoopModel | None) -> LoopModel:
-    """Return the model with the noise that another one declares; None for none at all."""
-    document = model.to_mapping()
-    known = (
-        {}
-        if other is None
-        else {
-            entry["name"]: entry["noise"]
-            for entry in other.to_mapping()["process"]["outputs"]
-            if "noise" in entry
-        }
-    )
-    for entry in document["process"]["outputs"]:
-        entry.pop("noise", None)
-        if entry["name"] in known:
-            entry["noise"] = known[entry["name"]]
-    return LoopModel.from_mapping(document, model.name)
-
-
 def with_common_rows(runs: Runs, model: LoopModel) -> Runs:
     """Return the records without the first rows that not every delay and order can score.
 
@@ -161,22 +137,31 @@ def _nested(problem: Problem, own: Equation, longest: int, rounds: int) -> list[
     return [dataclasses.replace(found, b=tuple(padded))]
 
 
-def refit_process(
-    model: LoopModel, runs: Runs, longest: int, rounds: int = REFIT_ROUNDS
-) -> LoopModel:
+def process_refitted(model: LoopModel, runs: Runs) -> LoopModel:
     """Return the model with ARX coefficients that fit the free run best, by Gauss-Newton.
 
     Effects and orders stay. The likelihood is that of the innovations on the fitted rows, as
     for every candidate.
 
     Args:
-        longest: delay tried, samples.
-        rounds: of Gauss-Newton, at most.
+        model: with an ARX process.
+        runs: the records.
 
     Raises:
         InputError: a process that is no ARX process.
     """
-    return refitted(FreeRun(model, runs), longest, rounds)
+    return refitted(FreeRun(model, with_common_rows(runs, model)), longest_delay(model))
+
+
+def refitted_behind(bare: LoopModel, run: FreeRun) -> LoopModel:
+    """Return ``bare`` with its process fitted again behind the stems of a run with effects."""
+    return with_equations(bare, equations_of(refitted(run, longest_delay(bare))))
+
+
+def open_figures(run: FreeRun) -> list[FloatArray]:
+    """Return per output what a unit of each coefficient moves, shape (N, n_a + n_b)."""
+    pairs = zip(problems_of(run), equations_of(run.model), strict=True)
+    return [problem.sensitivities(own, problem.forced(own)) for problem, own in pairs]
 
 
 def refitted(run: FreeRun, longest: int, rounds: int = REFIT_ROUNDS) -> LoopModel:

@@ -144,9 +144,8 @@ def _trimmed(numerator: FloatArray) -> FloatArray:
 
 
 GAIN, TIME_CONSTANT, LEAD, DELAY = "gain", "time_constant", "lead", "delay"
-MOST = {GAIN: 0.15, TIME_CONSTANT: 0.2, LEAD: 0.2, DELAY: 1.0}
-"""Logarithms and samples; beyond that it is an effect, not an error of the model."""
-OF_DELAY = 0.1  # of the model's dead time, beside the sample to which it may be rounded
+MOST = dict.fromkeys((GAIN, TIME_CONSTANT, LEAD), math.log(4.0)) | {DELAY: 10.0}
+"""Logarithms and samples; beyond that it is another plant."""
 PROBES = {GAIN: 0.01, TIME_CONSTANT: 0.01, LEAD: 0.01, DELAY: 0.1}  # of the derivatives
 SHORTEST = 1.0  # sample, of a time constant that counts
 
@@ -194,8 +193,7 @@ class Changeable:
         self._plants: list[Held | None] | None = plants if known else None
         self._poles = np.roots(own.denominator).astype(complex)
         whole = np.where(np.abs(self._poles) < NOTHING, NOTHING, self._poles)
-        late = MOST[DELAY] + OF_DELAY * max(own.delay)
-        self.figures = [Figure(GAIN, MOST[GAIN]), Figure(DELAY, late)]
+        self.figures = [Figure(GAIN, MOST[GAIN]), Figure(DELAY, MOST[DELAY])]
         self.figures += _of_roots(np.log(whole), TIME_CONSTANT, None)
         for j, plant in enumerate(plants if known else []):
             if plant is not None:

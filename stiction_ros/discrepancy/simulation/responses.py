@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.deferred import lfilter
-from stiction_ros.effects import Filter, FloatArray, LinearFilter
+from stiction_ros.effects import Filter, FloatArray
 from stiction_ros.processes import AlteredProcess, ArxProcess, LinearModel, Process, StirredTank
 
 
@@ -211,7 +211,7 @@ class AlteredResponses(Responses):
         self._inner = responses_of(process.inner, sample_time)
         self.skip = self._inner.skip
         self._filters = [
-            [_of_filter(e.filter(sample_time)) for e in chain if isinstance(e, LinearFilter)]
+            [_of_filter(f) for e in chain if (f := e.filter(sample_time)) is not None]
             for chain in process.effects
         ]
 

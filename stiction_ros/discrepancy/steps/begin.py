@@ -9,18 +9,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.discrepancy.data.controller_check import check_controller, unseen_of
-from stiction_ros.discrepancy.data.first_model import liveliest_parts
 from stiction_ros.discrepancy.data.gate import DataFinding, open_gate
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.kept_back import with_surprises_fitted
 from stiction_ros.discrepancy.gap_options import GapOptions
-from stiction_ros.discrepancy.process.refit import (
-    longest_delay,
-    refit_process,
-    with_common_rows,
-    without_noise,
-)
+from stiction_ros.discrepancy.process.first_model import liveliest_parts
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs, moves_on
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.effects import TimeShift, Tuning
@@ -47,7 +41,7 @@ def begin(
             without bound.
     """
     begun = time.perf_counter()
-    runs, gate = open_gate(model, liveliest_parts(records) if options.free_process else records)
+    runs, gate = open_gate(model, liveliest_parts(records) if options.process_fitted else records)
     controller = check_controller(model, runs)
     found = controller.finding
     data = (*((found,) if found else ()), *gate.findings)
@@ -56,15 +50,11 @@ def begin(
         op=controller.op(runs),
         scans=None if controller.scans is None else controller.scans.each(runs.op),
         unseen=unseen_of(runs, controller),
-        between=() if options.free_process else _between(model),
+        between=() if options.process_fitted else _between(model),
     )
     base = Baseline.of(FreeRun(model, runs))
     runs = with_surprises_fitted(base)
-    bare, longest = add_data_effects(model, data), 0
-    if options.free_process:
-        longest = longest_delay(model)
-        runs = with_common_rows(runs, model)
-        bare = refit_process(without_noise(bare), runs, longest)
+    bare = add_data_effects(model, data)
     task = Task(
         model=model,
         options=options,
@@ -72,13 +62,12 @@ def begin(
         controller=controller,
         data=data,
         runs=runs,
-        longest=longest,
         random=np.random.default_rng(options.seed),
         report=progress or (lambda share: None),
         begun=begun,
     )
     if runs is not base.run.runs:
-        base = Baseline.of(FreeRun(bare if options.free_process else model, runs))
+        base = Baseline.of(FreeRun(model, runs))
     return task, State(given=bare, bare=bare, before=base, base=base)
 
 

@@ -41,8 +41,7 @@ from stiction_ros.discrepancy.gap.noise_check import (
 )
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.process.free_search import with_free_process
-from stiction_ros.discrepancy.process.refit import with_noise_of
+from stiction_ros.discrepancy.process.refit import open_figures
 from stiction_ros.discrepancy.steps.look import MOVED_AWAY, explained
 from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
@@ -79,8 +78,6 @@ def closing(task: Task, looked: State) -> Discrepancy:
     for noise in louder:
         behaviour = from_mapping({"effect": noise.effect} | dict(noise.parameters))
         model = model.with_effect(noise.place, behaviour, **_provenance(task, noise))
-    if task.options.free_process:
-        model = with_noise_of(model, task.model)
     noises = check_noise(state.base)
     kept = {e.fit.candidate.key for e in state.added}
     no_names = [
@@ -91,6 +88,8 @@ def closing(task: Task, looked: State) -> Discrepancy:
     silent = not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE)
     if silent and (no_names or _taken_back(task, state) or _noise_left(task, state, noises)):
         verdict = GapVerdict.UNKNOWN
+    if state.changes and silent and verdict is not GapVerdict.UNKNOWN:
+        verdict = GapVerdict.NAMED
     told = {(e.place, e.effect) for e in effects} | {n for e in effects for n in e.alternatives}
     told |= set(alternatives)
     task.report(1.0)
@@ -172,6 +171,8 @@ def _found(task: Task, state: State) -> list[FoundEffect]:
         pairs = zip(without, state.added, strict=True)
         moved = [otherwise(base, effect.fit) for base, effect in pairs]
     slopes = [list(state.slopes)] if state.slopes else []
+    if task.options.process_fitted:
+        slopes = [open_figures(state.base.run)]
     found = []
     for k, effect in enumerate(state.added):
         others = [*moved[:k], *moved[k + 1 :], *slopes]
@@ -206,12 +207,12 @@ def _effect(
         figures_of(effect.behaviour),
         units_of(effect.behaviour, effect.place),
         _intervals(task, state, k, effect, without, beside),
-        state.gains.get((effect.place, effect.effect), effect.fit.delta_bic),
+        effect.fit.delta_bic,
         own_closed(
             without,
             state.base,
             dated=effect.fit.candidate.dated,
-            given=not task.options.free_process,
+            given=not task.options.process_fitted,
         ),
         GapVerdict.AMBIGUOUS if effect.alternatives else GapVerdict.NAMED,
         effect.alternatives,
@@ -235,10 +236,7 @@ def _intervals(
         found = bootstrap_intervals(
             base, effect.fit, task.options.resamples, task.random, share, beside
         )
-    found = without_its_jump(found, effect)
-    if not task.options.free_process:
-        return found
-    return with_free_process(found, base, effect.fit, task.longest)
+    return without_its_jump(found, effect)
 
 
 def _share(task: Task, state: State, k: int) -> Callable[[float], None]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+
+import numpy as np
 
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.base import Candidate
@@ -21,20 +23,27 @@ from stiction_ros.discrepancy.decision.extend import (
     held_rows_bear_out,
     left_open,
     moved_away,
+    refit_together,
+    run_with,
     tangents,
     told_already,
 )
-from stiction_ros.discrepancy.decision.measured_stem import not_contradicted, told_by_stem
+from stiction_ros.discrepancy.decision.measured_stem import (
+    confirmed,
+    not_contradicted,
+    told_by_stem,
+)
 from stiction_ros.discrepancy.decision.scores import (
     Scores,
     all_candidates,
     score_candidates,
     testable_effects,
 )
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.fit.uncertainty import chance_threshold, stored_threshold
 from stiction_ros.discrepancy.gap.where import locate
-from stiction_ros.discrepancy.process.free_process import in_doubt_of_place, score_with_free_process
+from stiction_ros.discrepancy.process.refit import open_figures, refitted_behind
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.discrepancy.steps.mending import (
     changed_again,
@@ -44,6 +53,7 @@ from stiction_ros.discrepancy.steps.mending import (
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.loop import LoopModel
 
+TURNS = 2  # in which a fitted process and the effects before it are fitted again
 SCORED = 0.8  # of the time of a look
 MANY = 0.2  # of the values, that were held or interpolated
 MOST_THINNED = 0.95  # of the values
@@ -56,16 +66,12 @@ class Scored:
     """What the scores of a look leave.
 
     Attributes:
-        state: where the process is free, with the one that was fitted again.
         candidates: that were tried.
         scores: of all of them.
-        models: where the process is free, the one behind each candidate.
     """
 
-    state: State
     candidates: tuple[Candidate, ...]
     scores: Scores
-    models: Mapping[tuple[str, str], LoopModel]
 
 
 def look_on(task: Task, state: State) -> State:
@@ -92,12 +98,12 @@ def look_on(task: Task, state: State) -> State:
 def look(task: Task, state: State, k: int) -> State:
     """Look for one effect more: the k-th, from 0."""
     scored = scored_by(task, state, k)
-    state, scores = scored.state, scored.scores
+    scores = scored.scores
     mended = process_first(task, state, scores)
     if mended is not None:
         return look(task, mended, k)
     decision = decided(task, state, scored)
-    room, step = _extended(task, state, scored, decision)
+    room, bare, step = _extended(task, state, decision)
     kept, reason = (step.kept, step.reason) if step else (False, decision.reason)
     own = Look(scores, decision, locate(scores.base), kept, reason)
     testable = testable_effects(scores.base, list(scored.candidates), task.options.margin)
@@ -109,7 +115,7 @@ def look(task: Task, state: State, k: int) -> State:
     seen = dataclasses.replace(
         room if kept else state, testable=testable, looks=(*state.looks, own), doubted=doubted
     )
-    return changed_again(task, _grown(seen, scored, decision, step)) if step and kept else seen
+    return changed_again(task, _grown(seen, bare, step)) if step and kept else seen
 
 
 def explained(state: State) -> bool:
@@ -154,26 +160,23 @@ def scored_by(task: Task, state: State, k: int) -> Scored:
         state: what is believed.
         k: how many looks there were, for the progress.
     """
-    free, share = task.options.free_process, 1.0 / (task.options.most_effects + 1)
-    base = state.base
-    if state.added and not free:
-        base = left_open(base, state.added, tangents(state.bare, task.runs, state.added))
+    share = 1.0 / (task.options.most_effects + 1)
+    base, fitted = state.base, task.options.process_fitted
+    if state.added or fitted:
+        slopes = tangents(state.bare, task.runs, state.added)
+        if fitted:
+            own = open_figures(base.run)
+            slopes = [np.hstack(pair) for pair in zip(slopes, own, strict=True)]
+        base = left_open(base, state.added, slopes)
     candidates = all_candidates(base, task.controller.clock_known)
+    if fitted:
+        candidates = tuple(each for each in candidates if not each.absorbed)
 
     def report(done: float) -> None:
         task.report((k + SCORED * done) * share)
 
-    if not free:
-        beside = left_open(state.base, state.added, state.slopes) if state.slopes else None
-        scores = score_candidates(base, candidates, report, beside=beside)
-        return Scored(state, candidates, scores, {})
-    found = score_with_free_process(base, candidates, task.longest, report)
-    state = dataclasses.replace(state, base=found.scores.base)
-    if not state.added:
-        refitted = _with_process(state.bare, state.base.run.model)
-        state = dataclasses.replace(state, before=state.base, bare=refitted)
-    models = {key: _with_process(state.bare, model) for key, model in found.models.items()}
-    return Scored(state, candidates, found.scores, models)
+    beside = left_open(state.base, state.added, state.slopes) if state.slopes else None
+    return Scored(candidates, score_candidates(base, candidates, report, beside=beside))
 
 
 def decided(task: Task, state: State, scored: Scored) -> Decision:
@@ -194,8 +197,8 @@ def decided(task: Task, state: State, scored: Scored) -> Decision:
     decision = decide(allowed, margin / measured, threshold / measured, rests_left(base.run))
     if measured < 1.0 and decision.verdict is GapVerdict.NONE:
         decision = thinned_away(decide(allowed, margin, threshold, rests_left(base.run)), measured)
-    if task.options.free_process:
-        decision = in_doubt_of_place(base, decision)
+    if task.options.process_fitted:
+        decision = _in_doubt_of_place(base, decision)
     return told_by_stem(base.run, decision, allowed)
 
 
@@ -210,42 +213,52 @@ def rests_left(run: FreeRun) -> Callable[[CandidateFit], int]:
 
 
 def _extended(
-    task: Task, state: State, scored: Scored, decision: Decision
-) -> tuple[State, Extension | None]:
-    """Return the state behind which the chosen effect stands, and the model with it.
+    task: Task, state: State, decision: Decision
+) -> tuple[State, LoopModel, Extension | None]:
+    """Return the state behind which the chosen effect stands, its model, and that with it.
 
     None where none may be added.
     """
     chosen = decision.chosen
-    lent = chosen is None and state.doubted is None and not task.options.free_process
+    lent = chosen is None and state.doubted is None and not task.options.process_fitted
     if lent:
         chosen = decision.lent
-    if chosen is None or (task.options.free_process and not decision.inseparable):
-        return state, None
+    if chosen is None or (task.options.process_fitted and not decision.inseparable):
+        return state, state.bare, None
     behaviour = chosen.behaviour(state.base.run)
     assert behaviour is not None
     room, new = made_room(task, state, AddedEffect(chosen, behaviour, decision.alternatives))
-    bare = scored.models.get(chosen.candidate.key, room.bare)
-    return room, extend(bare, task.runs, room.added, new, state.base, lent=lent)
+    bare, effects = room.bare, [*room.added, new]
+    for _ in range(TURNS if task.options.process_fitted else 0):
+        bare = refitted_behind(bare, run_with(bare, task.runs, effects))
+        effects = refit_together(bare, task.runs, effects)
+    *others, new = effects
+    return room, bare, extend(bare, task.runs, others, new, state.base, lent=lent)
 
 
-def _grown(state: State, scored: Scored, decision: Decision, step: Extension) -> State:
-    """Return the state with the effects of an extension."""
-    assert decision.tried is not None
-    key = decision.tried.candidate.key
-    gained = {key: decision.tried.delta_bic} if scored.models else {}
+def _grown(state: State, bare: LoopModel, step: Extension) -> State:
+    """Return the state with the effects of an extension, and the model behind them."""
+    earlier = (*state.earlier, state.bare)
+    return dataclasses.replace(state, bare=bare, base=step.base, added=step.added, earlier=earlier)
+
+
+def _in_doubt_of_place(base: Baseline, decision: Decision) -> Decision:
+    """Return the decision, a static curve of the valve left in doubt with one of the process.
+
+    A fitted linear process behind a curve and a curved process behind a linear valve give the
+    same record, so that neither may be added. A recorded stem may confirm the curve.
+    """
+    if decision.chosen is None or not decision.chosen.candidate.about.bends:
+        return decision
+    if confirmed(base.run, decision.chosen):
+        return decision
+    _, _, valve = decision.chosen.candidate.place.partition(":")
+    names = base.run.model.outputs
+    curves = [(f"process:{names[i]}", "gain") for i in sorted(decision.chosen.noise)]
     return dataclasses.replace(
-        state,
-        bare=scored.models.get(key, state.bare),
-        base=step.base,
-        added=step.added,
-        earlier=(*state.earlier, state.bare),
-        gains={**state.gains, **gained},
+        decision,
+        verdict=GapVerdict.AMBIGUOUS,
+        alternatives=tuple(dict.fromkeys([*decision.alternatives, *curves])),
+        inseparable=False,
+        reason=f"a bend between OP of {valve} and PV may be the valve's or the process's",
     )
-
-
-def _with_process(model: LoopModel, other: LoopModel) -> LoopModel:
-    """Return ``model`` with the process of ``other``."""
-    document = model.to_mapping()
-    document["process"] = other.to_mapping()["process"]
-    return LoopModel.from_mapping(document, model.name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -29,7 +29,6 @@ class Task:
         options: of the run.
         gate, controller, data: what the data themselves show.
         runs: the records end to end.
-        longest: delay tried where the process is free, samples; 0 where it is given.
         random: source of the bootstraps, drawn from in the order of the steps.
         report: called with the share done.
         begun: of the clock, s.
@@ -41,7 +40,6 @@ class Task:
     controller: ControllerCheck
     data: tuple[DataFinding, ...]
     runs: Runs
-    longest: int
     random: np.random.Generator
     report: Progress
     begun: float
@@ -59,7 +57,6 @@ class State:
         before, base: free runs without and with what was added.
         added: effects that are in the model, in the order in which they were found.
         earlier: ``bare`` before each of them came, as long as they may be taken back.
-        gains: BIC by which an effect beat the model, where the process is free.
         looks: the rounds so far.
         opened: the first look at the process as it is now.
         testable: what the last look could have seen.
@@ -75,7 +72,6 @@ class State:
     slopes: tuple[FloatArray, ...] = ()
     added: tuple[AddedEffect, ...] = ()
     earlier: tuple[LoopModel, ...] = ()
-    gains: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)
     looks: tuple[Look, ...] = ()
     opened: int = 0
     testable: tuple[Testable, ...] = ()

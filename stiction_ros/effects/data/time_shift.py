@@ -14,16 +14,10 @@ class TimeShift(Delay):
     r"""PV is recorded too late against OP: y_k = (1 − f) x_{k−n} + f x_{k−n−1}.
 
     The loop itself does not feel it; a controller that is recomputed from PV and SP does.
-
-    Raises:
-        InputError: a shift out of range.
     """
 
     effect: ClassVar[str] = "time_shift"
     places: ClassVar[tuple[str, ...]] = ("data",)
-    signature: ClassVar[str] = "OP answers PV before the record shows why"
-    minimum_data: ClassVar[str] = "the controller's tuning, and moves of PV above its noise"
-    confusable: ClassVar[tuple[str, ...]] = ("process delay", "data tuning")
     experiment: ClassVar[str] = "record SP, and the tuning as it is written down"
     separation: ClassVar[str] = (
         "record the set-point and the controller's tuning, or put OP and PV on one clock"

@@ -17,16 +17,10 @@ class Tuning(Behaviour):
 
     The signal is e = SP − PV, what comes out is OP less the OP before the first sample. The
     memory is (u, e, time of the last sample). At the first sample OP does not move.
-
-    Raises:
-        InputError: an integral time that is not positive.
     """
 
     effect: ClassVar[str] = "tuning"
     places: ClassVar[tuple[str, ...]] = ("data",)
-    signature: ClassVar[str] = "OP recomputed from PV and SP with the recorded tuning is another"
-    minimum_data: ClassVar[str] = "PV, SP and OP of the same clock, and the recorded tuning"
-    confusable: ClassVar[tuple[str, ...]] = ("data time_shift",)
     experiment: ClassVar[str] = "record SP, and the tuning as it is written down"
     not_searched: ClassVar[str] = (
         "OP recomputed from PV and SP shows it, where both and a tuning are recorded"
@@ -39,7 +33,6 @@ class Tuning(Behaviour):
         return (0.0, value, NO_SAMPLE)
 
     def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
-        """Return the memory (u, e, time) and the change u of OP since the start, %."""
         assert isinstance(memory, tuple)
         op, last, before = memory
         if before == NO_SAMPLE:

@@ -21,15 +21,9 @@ class ColouredDisturbance(DrawnDisturbance):
     The memory is (w, time of the last sample). Who simulates it draws n; the plant does so
     from a source of its own, so that the other noise stays what it was. :meth:`step` draws
     nothing: it adds what is expected of w, which from rest is nothing.
-
-    Raises:
-        InputError: a negative or non-finite parameter.
     """
 
     effect: ClassVar[str] = "coloured"
-    signature: ClassVar[str] = "a gap that wanders without a relation to OP, set-point or time"
-    minimum_data: ClassVar[str] = "a record of many time constants"
-    confusable: ClassVar[tuple[str, ...]] = ("disturbance random_walk", "disturbance drift")
     experiment: ClassVar[str] = "none: coloured noise is what the noise model describes"
     not_searched: ClassVar[str] = (
         "coloured noise is what the noise model describes; it is named where the noise is "

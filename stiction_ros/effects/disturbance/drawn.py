@@ -6,9 +6,7 @@ import dataclasses
 from abc import abstractmethod
 from typing import ClassVar
 
-import numpy as np
-
-from stiction_ros.effects.behaviour import NO_SAMPLE, Behaviour, FloatArray, Memory
+from stiction_ros.effects.behaviour import NO_SAMPLE, Behaviour, Memory
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,7 +22,6 @@ class DrawnDisturbance(Behaviour):
         return (0.0, NO_SAMPLE)
 
     def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
-        """Return the memory and the signal with what is expected of w added."""
         return self.step_with(memory, value, time, 0.0)
 
     @abstractmethod
@@ -32,9 +29,3 @@ class DrawnDisturbance(Behaviour):
         self, memory: Memory, value: float, time: float, normal: float
     ) -> tuple[Memory, float]:
         """Advance one sample with ``normal`` drawn from N(0, 1)."""
-
-    def simulate(
-        self, values: FloatArray, start: float | None = None, sample_time: float = 1.0
-    ) -> FloatArray:
-        """Return the signal as it is: from rest nothing is expected to be added."""
-        return np.array(values, dtype=float)

@@ -14,14 +14,6 @@ class DriftDisturbance(Behaviour):
 
     effect: ClassVar[str] = "drift"
     places: ClassVar[tuple[str, ...]] = ("load", "disturbance", "sensor")
-    signature: ClassVar[str] = "a gap that grows in proportion to time"
-    minimum_data: ClassVar[str] = "a record much longer than the noise remembers"
-    confusable: ClassVar[tuple[str, ...]] = (
-        "load drift",
-        "disturbance drift",
-        "sensor drift",
-        "process leak",
-    )
     experiment: ClassVar[str] = "take a longer record"
     separation: ClassVar[str] = "compare PV with a second sensor at the start and at the end"
 

@@ -17,7 +17,6 @@ class PeriodicDisturbance(Behaviour):
     """What the periodic waves share: they add ``amplitude`` times a wave of height one."""
 
     places: ClassVar[tuple[str, ...]] = ("load", "disturbance")
-    minimum_data: ClassVar[str] = "four periods"
     experiment: ClassVar[str] = "take a record of many periods"
 
     amplitude: float = parameter("amplitude", "signal", "half the peak-to-peak height", low=0.0)

@@ -18,15 +18,9 @@ class RandomWalkDisturbance(DrawnDisturbance):
 
     The memory is (w, time of the last sample). Who simulates it draws n; :meth:`step` draws
     nothing, so that from rest it adds nothing.
-
-    Raises:
-        InputError: a negative or non-finite parameter.
     """
 
     effect: ClassVar[str] = "random_walk"
-    signature: ClassVar[str] = "a gap that wanders ever farther without a relation to OP"
-    minimum_data: ClassVar[str] = "a record in which it leaves the noise far behind"
-    confusable: ClassVar[tuple[str, ...]] = ("disturbance coloured", "disturbance drift")
     experiment: ClassVar[str] = "none: a wandering disturbance is what the noise model describes"
     not_searched: ClassVar[str] = (
         "a wandering disturbance is what the noise model describes; it is named where the noise is "

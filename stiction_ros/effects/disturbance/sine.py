@@ -16,8 +16,6 @@ class SineDisturbance(PeriodicDisturbance):
     """Adds a sine, by default one that starts at zero with the first sample."""
 
     effect: ClassVar[str] = "sine"
-    signature: ClassVar[str] = "a gap with one spectral line, whose phase OP does not move"
-    confusable: ClassVar[tuple[str, ...]] = ("disturbance triangle", "disturbance coloured")
 
     @staticmethod
     def wave(angle: FloatArray) -> FloatArray:

@@ -17,8 +17,6 @@ class SquareDisturbance(PeriodicDisturbance):
     """Adds a square wave: up for half a period, then down for as long."""
 
     effect: ClassVar[str] = "square"
-    signature: ClassVar[str] = "a gap that changes sides at equal times, whatever OP does"
-    confusable: ClassVar[tuple[str, ...]] = ("disturbance sine", "disturbance step")
 
     @staticmethod
     def wave(angle: FloatArray) -> FloatArray:

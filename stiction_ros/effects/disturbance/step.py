@@ -15,13 +15,6 @@ class StepDisturbance(Behaviour):
 
     effect: ClassVar[str] = "step"
     places: ClassVar[tuple[str, ...]] = ("load", "disturbance")
-    signature: ClassVar[str] = "a gap that is another constant before and after one moment"
-    minimum_data: ClassVar[str] = "samples on both sides, longer than the noise remembers"
-    confusable: ClassVar[tuple[str, ...]] = (
-        "sensor bias_step",
-        "valve offset",
-        "disturbance drift",
-    )
     experiment: ClassVar[str] = "take a longer record around the moment"
 
     onset: float = parameter("time", "s", "time of the step since the first sample")

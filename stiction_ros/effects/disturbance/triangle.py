@@ -17,8 +17,6 @@ class TriangleDisturbance(PeriodicDisturbance):
     """Adds a triangle wave that, as a sine, starts at zero and upwards."""
 
     effect: ClassVar[str] = "triangle"
-    signature: ClassVar[str] = "a gap of straight ramps to and fro, whatever OP does"
-    confusable: ClassVar[tuple[str, ...]] = ("disturbance sine", "disturbance drift")
 
     @staticmethod
     def wave(angle: FloatArray) -> FloatArray:

@@ -7,11 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray, Memory, starts
+from stiction_ros.effects.behaviour import FloatArray, Memory, Start, starts
 from stiction_ros.effects.friction.moving_rules import SlopeRules
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
-from stiction_ros.effects.friction.stiction import JumpForm
-from stiction_ros.effects.friction.switching import MovingCells, Switching
+from stiction_ros.effects.friction.stiction import JumpForm, Switching
 
 MOVING = -1.0  # a threshold that every |u − x_ss| exceeds
 
@@ -50,7 +49,7 @@ class ChoudhuryStiction(SlipJumpPair):
 
     law: ClassVar[str | None] = "choudhury"
     not_searched: ClassVar[str] = NOT_SEARCHED
-    switching: ClassVar[Switching | None] = MovingCells(SlopeRules)
+    switching: ClassVar[Switching] = SlopeRules
 
     def rest(self, value: float) -> Memory:
         return (value, value, 0.0, value, self.static_friction, self.static_friction)
@@ -64,7 +63,6 @@ class ChoudhuryStiction(SlipJumpPair):
         return JumpForm(self, self.static_friction, self.dynamic_friction, strokes=2)
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        """Return the memory (χ, u, v, x_ss, up, down) and the stem position χ."""
         assert isinstance(memory, tuple)
         stem, last, last_slope, stuck_at, up, down = memory
         slope = float((value > last) - (value < last))
@@ -80,13 +78,8 @@ class ChoudhuryStiction(SlipJumpPair):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return stem positions, shape (N, G), for all rows (S, J) of ``grid`` at once."""
         from stiction_ros.effects.grid_kernels import choudhury_stems  # compiled: slow to import
 
         band, jump = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])

@@ -7,10 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray, Memory
+from stiction_ros.effects.behaviour import FloatArray, Memory, Start
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
-from stiction_ros.effects.friction.stiction import JumpForm
-from stiction_ros.effects.friction.switching import SlipCells, Switching
+from stiction_ros.effects.friction.stiction import SLIPS, JumpForm, Switching
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,9 +26,6 @@ class HeStiction(FrictionPair):
     The memory is the stem position χ. The smallest move of the stem is the
     :attr:`jump` J = f_S − f_D.
 
-    Raises:
-        InputError: a negative or non-finite friction, or f_D > f_S.
-
     Examples:
         >>> import numpy as np
         >>> from stiction_ros import HeStiction
@@ -40,7 +36,7 @@ class HeStiction(FrictionPair):
 
     law: ClassVar[str | None] = "he"
     not_searched: ClassVar[str] = NOT_SEARCHED
-    switching: ClassVar[Switching | None] = SlipCells()
+    switching: ClassVar[Switching] = SLIPS
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
         """Return the stem position twice, as memory and as output, by (4).
@@ -66,11 +62,7 @@ class HeStiction(FrictionPair):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
         """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once.
 

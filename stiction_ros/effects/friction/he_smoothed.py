@@ -30,20 +30,10 @@ class SmoothedHeStiction(HeStiction):
     smoothing: float = parameter("tau", "1/%", "smoothing parameter τ", low=1e-6, default=1e4)
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        """Return the stem position twice, as memory and as output, by (5) and (6)."""
         assert isinstance(memory, float | int)
-        stem = float(self._next(memory, value, math.tanh))
-        return stem, stem
-
-    def expression(self, memory: Any, value: Any) -> Any:
-        """Return the next stem position as a CasADi expression."""
-        import casadi
-
-        return self._next(memory, value, casadi.tanh)
-
-    def _next(self, stem: Any, value: Any, tanh: Any) -> Any:
         frictions = self.static_friction, self.dynamic_friction
-        return smoothed_step(stem, value, frictions, self.smoothing, tanh)
+        stem = float(smoothed_step(memory, value, frictions, self.smoothing, math.tanh))
+        return stem, stem
 
 
 def smoothed_step(

@@ -6,9 +6,7 @@ import dataclasses
 import math
 from typing import Any, ClassVar
 
-import numpy as np
-
-from stiction_ros.effects.behaviour import FloatArray, Memory, parameter
+from stiction_ros.effects.behaviour import Memory, parameter
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
 
 REST = 10.0  # OP that moves by less than REST / τ in a sample rests
@@ -55,47 +53,10 @@ class SmoothedKanoStiction(SlipJumpPair):
         return (value, value, 0.0)
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        """Return the memory (χ, u, d) and the stem position χ."""
         assert isinstance(memory, tuple)
-        stem, direction = kano_step(memory, value, self._figures(), math.tanh)
+        figures = self.static_friction, self.dynamic_friction, self.smoothing
+        stem, direction = kano_step(memory, value, figures, math.tanh)
         return (float(stem), value, float(direction)), float(stem)
-
-    @classmethod
-    def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
-    ) -> FloatArray:
-        """Return stem positions, shape (N, G), for rows (S, J) or (S, J, τ).
-
-        They differ from :meth:`simulate` in the last digits, as two libraries' tanh do.
-        """
-        band, jump = grid[:, 0], grid[:, 1]
-        tau = grid[:, 2] if grid.shape[1] > 2 else np.full(len(grid), 1e4)
-        figures = ((band + jump) / 2.0, (band - jump) / 2.0, tau)
-        stem = np.broadcast_to(np.asarray(start, dtype=float), band.shape)
-        memory = (stem, stem, np.zeros(band.shape))
-        out = np.empty((len(values), len(band)))
-        for k, value in enumerate(values.tolist()):
-            out[k], direction = kano_step(memory, value, figures, np.tanh)
-            memory = (out[k], value, direction)
-        return out
-
-    def expression(self, memory: Any, value: Any) -> Any:
-        """Return the next stem position as a CasADi expression of the memory (χ, u, d)."""
-        return self.expressions(memory, value)[1]
-
-    def expressions(self, memory: Any, value: Any) -> tuple[tuple[Any, Any, Any], Any]:
-        """Return the next memory (χ, u, d) and the stem position as CasADi expressions."""
-        import casadi
-
-        stem, direction = kano_step(memory, value, self._figures(), casadi.tanh)
-        return (stem, value, direction), stem
-
-    def _figures(self) -> tuple[float, float, float]:
-        return self.static_friction, self.dynamic_friction, self.smoothing
 
 
 def kano_step(memory: Any, value: Any, figures: tuple[Any, Any, Any], tanh: Any) -> tuple[Any, Any]:

@@ -7,60 +7,16 @@ after a reversal before the stem moves, J = f_S − f_D the jump that the stem t
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+from typing import Self
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import (
-    Behaviour,
-    FloatArray,
-    Parameter,
-    SimulatesGrid,
-    parameter,
-)
+from stiction_ros.effects.behaviour import FloatArray, parameter
 from stiction_ros.effects.friction.stiction import Stiction
-from stiction_ros.effects.friction.switching import Switching
 from stiction_ros.effects.seen import Seen
 from stiction_ros.errors import InputError
 
 NOT_SEARCHED = "stiction is searched by the laws he and xch"  # what the laws here say to the gap
-
-
-@runtime_checkable
-class FrictionLaw(SimulatesGrid, Protocol):
-    """A stiction law that can be identified: simulated on whole grids, given by (f_S, f_D).
-
-    Attributes:
-        switching: how its switching patterns are listed; None for a search on grids alone.
-        not_identified: why it is not identified, one clause; empty when it is.
-        held: keys of further parameters that stay at their defaults.
-    """
-
-    law: ClassVar[str | None]
-    switching: ClassVar[Switching | None]
-    not_identified: ClassVar[str]
-    held: ClassVar[tuple[str, ...]]
-
-    @classmethod
-    def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Behaviour:
-        """Return the law with f_S and f_D in %."""
-        ...
-
-    @classmethod
-    def rows_of_frictions(cls, grid: FloatArray) -> FloatArray:
-        """Return rows of the law's own first two parameters for rows (f_S, f_D), shape (G, 2)."""
-        ...
-
-    @classmethod
-    def parameters(cls) -> tuple[Parameter, ...]:
-        """Return its parameters; those behind the first two are searched as well."""
-        ...
-
-    @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> Behaviour:
-        """Return the law with the given values by key."""
-        ...
 
 
 @dataclasses.dataclass(frozen=True)
@@ -159,6 +115,10 @@ class SlipJumpPair(Stiction):
     def dynamic_friction(self) -> float:
         """Distance that the moving stem keeps from OP, f_D = (S − J)/2, in %."""
         return (self.stick_band - self.jump) / 2.0
+
+
+FrictionLaw = FrictionPair | SlipJumpPair
+"""A stiction law that can be identified; parameters behind the first two are searched as well."""
 
 
 def _all_known(kind: type[Stiction]) -> None:

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray, Memory, parameter
+from stiction_ros.effects.behaviour import FloatArray, Memory, Start, parameter
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
 from stiction_ros.effects.friction.stiction import JumpForm
 
@@ -51,7 +51,6 @@ class SemiPhysicalStiction(FrictionPair):
     overshoot: float = parameter("k", "1", "overshoot factor K", low=1.0, high=2.0, default=1.99)
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        """Return the stem position twice, as memory and as output."""
         assert isinstance(memory, float | int)
         stem, error = float(memory), value - memory
         if error > self.static_friction:
@@ -61,18 +60,12 @@ class SemiPhysicalStiction(FrictionPair):
         return stem, stem
 
     def jump_form(self) -> JumpForm:
-        """Return the moves that the valve can make when OP rests between them."""
         return JumpForm(self, self.static_friction, self.dynamic_friction, self.overshoot)
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return stem positions, shape (N, G), for rows (f_S, f_D) or (f_S, f_D, K)."""
         from stiction_ros.effects.grid_kernels import semi_physical_stems  # compiled
 
         static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])

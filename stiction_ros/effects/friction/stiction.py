@@ -11,8 +11,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 from stiction_ros.effects.behaviour import Behaviour
-from stiction_ros.effects.friction.switching import Switching
+from stiction_ros.effects.friction.moving_rules import MovingRules
 
+SLIPS = "slips"  # the switching of He's law: a rectangle of J and S for each pattern of slips
+Switching = str | type[MovingRules] | None
 LEAST_MARGIN = 1e-4  # %; an error of exactly f_S does not slip
 
 
@@ -119,8 +121,9 @@ class Stiction(Behaviour):
     """What holds for every friction law that does not say otherwise.
 
     Attributes:
-        switching: how its switching patterns are listed, so that a search can be exact; the
-            exact search refuses a law with None, the default search takes it.
+        switching: how its switching patterns are listed, so that a search can be exact:
+            :data:`SLIPS`, or the rules of a law with a moving state. The exact search refuses a law
+            with None, the default search takes it.
         not_identified: why it is not identified, one clause; empty when it is.
         held: keys of further parameters that stay at their defaults, which is said: constants of
             the law. All others are identified.
@@ -128,9 +131,6 @@ class Stiction(Behaviour):
 
     effect: ClassVar[str] = "stiction"
     places: ClassVar[tuple[str, ...]] = ("valve",)
-    signature: ClassVar[str] = "PV moves in jumps while OP ramps, and rests while OP reverses"
-    minimum_data: ClassVar[str] = "several slips, by a limit cycle or by set-point moves"
-    confusable: ClassVar[tuple[str, ...]] = ("valve backlash when J = 0",)
     experiment: ClassVar[str] = (
         "let OP reverse by more than the friction that matters, as a cycle does"
     )
@@ -141,10 +141,13 @@ class Stiction(Behaviour):
     family: ClassVar[str] = "friction"
     least: ClassVar[float] = 0.1  # %
     # For `stiction identify`.
-    switching: ClassVar[Switching | None] = None
+    switching: ClassVar[Switching] = None
     not_identified: ClassVar[str] = ""
     held: ClassVar[tuple[str, ...]] = ()
-    told_of_step: ClassVar[tuple[str, ...]] = ("simulate_grid", "switching", "jump_form")
+    told_of_step: ClassVar[tuple[str, ...]] = (
+        *Behaviour.told_of_step,
+        *("switching", "jump_form"),
+    )
 
     def jump_form(self) -> JumpForm | None:
         """Return the moves that it can make when OP rests between them.

@@ -7,11 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray, Memory, starts
+from stiction_ros.effects.behaviour import FloatArray, Memory, Start, starts
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
-from stiction_ros.effects.friction.stiction import JumpForm
-from stiction_ros.effects.friction.switching import MovingCells, Switching
+from stiction_ros.effects.friction.stiction import JumpForm, Switching
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,13 +46,12 @@ class XchStiction(FrictionPair):
 
     law: ClassVar[str | None] = "xch"
     not_searched: ClassVar[str] = NOT_SEARCHED
-    switching: ClassVar[Switching | None] = MovingCells(FollowingRules)
+    switching: ClassVar[Switching] = FollowingRules
 
     def rest(self, value: float) -> Memory:
         return (value, value, 0.0)
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        """Return the memory (χ, u, d) and the stem position χ."""
         assert isinstance(memory, tuple)
         stem, last, direction = memory
         error = value - stem
@@ -65,18 +63,12 @@ class XchStiction(FrictionPair):
         return (stem, value, direction), stem
 
     def jump_form(self) -> JumpForm:
-        """Return the moves that the valve can make when OP rests between them."""
         return JumpForm(self, self.static_friction, self.dynamic_friction)
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once."""
         from stiction_ros.effects.grid_kernels import xch_stems  # compiled: slow to import
 
         static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])

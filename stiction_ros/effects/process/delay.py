@@ -12,22 +12,10 @@ from stiction_ros.effects.seen import Seen
 
 @dataclasses.dataclass(frozen=True)
 class ExtraDelay(Delay):
-    r"""A longer dead time: y_k = (1 − f) x_{k−n} + f x_{k−n−1} for n + f more samples.
-
-    Raises:
-        InputError: a delay out of range.
-    """
+    r"""A longer dead time: y_k = (1 − f) x_{k−n} + f x_{k−n−1} for n + f more samples."""
 
     effect: ClassVar[str] = "delay"
     places: ClassVar[tuple[str, ...]] = ("process",)
-    signature: ClassVar[str] = "PV answers every move later than the model, in the same shape"
-    minimum_data: ClassVar[str] = "set-point moves or other fast moves of OP"
-    confusable: ClassVar[tuple[str, ...]] = (
-        "valve lag",
-        "process pole",
-        "sensor lag",
-        "data time_shift",
-    )
     experiment: ClassVar[str] = "move the set-point in steps"
     separation: ClassVar[str] = (
         "record the set-point and the controller's tuning, or put OP and PV on one clock"

@@ -7,24 +7,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import Behaviour, Filter, FloatArray, Memory, parameter
+from stiction_ros.effects.behaviour import Behaviour, Filter, FloatArray, Memory, Start, parameter
 
 
 @dataclasses.dataclass(frozen=True)
 class ProcessGain(Behaviour):
-    """y = factor · x in deviations from the operating point, without memory.
-
-    Raises:
-        InputError: a factor out of range.
-    """
+    """y = factor · x in deviations from the operating point, without memory."""
 
     effect: ClassVar[str] = "gain"
     places: ClassVar[tuple[str, ...]] = ("process",)
-    signature: ClassVar[str] = (
-        "every move of PV is larger or smaller than the model's, by one factor"
-    )
-    minimum_data: ClassVar[str] = "set-point moves or disturbances well above the noise"
-    confusable: ClassVar[tuple[str, ...]] = ("valve characteristic",)
     experiment: ClassVar[str] = "move the set-point in steps well above the noise"
     separation: ClassVar[str] = "hold the set-point at three levels of OP, tens of per cent apart"
     absorbed: ClassVar[bool] = True
@@ -36,13 +27,8 @@ class ProcessGain(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return outputs, shape (N, G), for rows (factor,)."""
         return values[:, None] * grid[:, 0]
 
     def filter(self, sample_time: float) -> Filter:

@@ -14,6 +14,7 @@ from stiction_ros.effects.behaviour import (
     Filter,
     FloatArray,
     Memory,
+    Start,
     elapsed,
     parameter,
     starts,
@@ -35,16 +36,10 @@ class Leak(Behaviour):
 
     The memory is (y, x, time of the last sample). It rests with y = x, as if the leak began
     with the first sample.
-
-    Raises:
-        InputError: a negative or non-finite rate.
     """
 
     effect: ClassVar[str] = "leak"
     places: ClassVar[tuple[str, ...]] = ("process",)
-    signature: ClassVar[str] = "PV falls back after every move that the model would keep"
-    minimum_data: ClassVar[str] = "a record of several times 1/rate with set-point moves"
-    confusable: ClassVar[tuple[str, ...]] = ("disturbance drift", "sensor drift", "process gain")
     experiment: ClassVar[str] = "move the set-point and hold it for several times the leak's time"
     absorbed: ClassVar[bool] = True
 
@@ -58,7 +53,6 @@ class Leak(Behaviour):
         return (value, value, NO_SAMPLE)
 
     def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
-        """Return the memory (y, x, time) and y."""
         assert isinstance(memory, tuple)
         last, before, at = memory
         out = math.exp(-self.rate * elapsed(at, time)) * last + (value - before)
@@ -66,13 +60,8 @@ class Leak(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return outputs, shape (N, G), for rows (rate,)."""
         from stiction_ros.effects.grid_kernels import leaking  # compiled: slow to import
 
         keep = np.exp(-grid[:, 0] * sample_time)

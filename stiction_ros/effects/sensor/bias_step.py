@@ -14,5 +14,4 @@ class BiasStep(StepDisturbance):
 
     effect: ClassVar[str] = "bias_step"
     places: ClassVar[tuple[str, ...]] = ("sensor",)
-    confusable: ClassVar[tuple[str, ...]] = ("disturbance step",)
     separation: ClassVar[str] = "compare PV with a second sensor or a laboratory value"

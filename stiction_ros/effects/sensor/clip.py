@@ -11,17 +11,10 @@ from stiction_ros.effects.limits import Limits
 
 @dataclasses.dataclass(frozen=True)
 class Clip(Limits):
-    """A sensor that shows nothing below ``low`` and above ``high``.
-
-    Raises:
-        InputError: limits that are not finite, or low > high.
-    """
+    """A sensor that shows nothing below ``low`` and above ``high``."""
 
     effect: ClassVar[str] = "clip"
     places: ClassVar[tuple[str, ...]] = ("sensor",)
-    signature: ClassVar[str] = "PV rests at exactly one value, without noise, again and again"
-    minimum_data: ClassVar[str] = "PV passes a limit"
-    confusable: ClassVar[tuple[str, ...]] = ("sensor freeze",)
     in_values: ClassVar[bool] = True
     not_searched: ClassVar[str] = "the values of PV show it, which are looked at first"
 

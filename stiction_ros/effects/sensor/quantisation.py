@@ -7,22 +7,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, parameter
+from stiction_ros.effects.behaviour import Behaviour, Memory, parameter
 
 
 @dataclasses.dataclass(frozen=True)
 class Quantisation(Behaviour):
-    """Rounds to the nearest multiple of ``step``, halves to even, without memory.
-
-    Raises:
-        InputError: a quantum that is not positive.
-    """
+    """Rounds to the nearest multiple of ``step``, halves to even, without memory."""
 
     effect: ClassVar[str] = "quantisation"
     places: ClassVar[tuple[str, ...]] = ("sensor",)
-    signature: ClassVar[str] = "PV takes few values, all multiples of one quantum"
-    minimum_data: ClassVar[str] = "PV crosses several quanta"
-    confusable: ClassVar[tuple[str, ...]] = ("sensor freeze",)
     in_values: ClassVar[bool] = True
     not_searched: ClassVar[str] = "the values of PV show it, which are looked at first"
 
@@ -30,15 +23,3 @@ class Quantisation(Behaviour):
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
         return memory, self.quantum * float(np.rint(value / self.quantum))
-
-    @classmethod
-    def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
-    ) -> FloatArray:
-        """Return outputs, shape (N, G), for rows (step,)."""
-        quantum = grid[:, 0]
-        return np.asarray(quantum * np.rint(values[:, None] / quantum))

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, parameter, starts
+from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, Start, parameter, starts
 from stiction_ros.effects.seen import Seen
 
 
@@ -20,18 +20,10 @@ class Backlash(Behaviour):
 
     The memory is the stem position χ, which rests in the middle of the play. It is He's law
     (3) with f_S = f_D = b/2, that is stiction without a jump.
-
-    Raises:
-        InputError: a negative or non-finite band.
     """
 
     effect: ClassVar[str] = "backlash"
     places: ClassVar[tuple[str, ...]] = ("valve",)
-    signature: ClassVar[str] = (
-        "after every reversal of OP the stem rests until OP has crossed the band"
-    )
-    minimum_data: ClassVar[str] = "several reversals of OP wider than the band"
-    confusable: ClassVar[tuple[str, ...]] = ("valve stiction with J = 0",)
     experiment: ClassVar[str] = "let OP reverse by more than the play that matters"
     separation: ClassVar[str] = (
         "ramp OP slowly through a reversal and back: a stem that jumps after its rest has "
@@ -47,7 +39,6 @@ class Backlash(Behaviour):
         return (1.0,)
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        """Return the stem position twice, as memory and as output."""
         assert isinstance(memory, float | int)
         half = self.band / 2.0
         stem = min(max(float(memory), value - half), value + half)
@@ -55,13 +46,8 @@ class Backlash(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return stem positions, shape (N, G), for rows (band,)."""
         from stiction_ros.effects.grid_kernels import playing  # compiled: slow to import
 
         half = grid[:, 0] / 2.0

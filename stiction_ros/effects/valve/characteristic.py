@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, parameter
+from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, Start, parameter
 from stiction_ros.effects.seen import Seen
 
 _STRAIGHT = 1e-6
@@ -24,16 +24,10 @@ class Characteristic(Behaviour):
     c = 0 is straight, c > 0 opens slowly first, as an equal-percentage valve of
     rangeability R = e^c, c < 0 opens quickly first. The curve goes on beyond 0 and 100 %;
     it takes OP in absolute per cent.
-
-    Raises:
-        InputError: a curvature out of range.
     """
 
     effect: ClassVar[str] = "characteristic"
     places: ClassVar[tuple[str, ...]] = ("valve",)
-    signature: ClassVar[str] = "the gain from OP to PV grows or falls with OP"
-    minimum_data: ClassVar[str] = "set-points at two levels of OP, tens of per cent apart"
-    confusable: ClassVar[tuple[str, ...]] = ("process gain", "valve saturation")
     experiment: ClassVar[str] = (
         "hold the set-point at levels for which OP differs by tens of per cent"
     )
@@ -54,13 +48,8 @@ class Characteristic(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return outputs, shape (N, G), for rows (curve,)."""
         straight = np.abs(grid[:, 0]) < _STRAIGHT
         curve = np.where(straight, 1.0, grid[:, 0])
         curved = 100.0 * np.expm1(values[:, None] * (curve / 100.0)) / np.expm1(curve)

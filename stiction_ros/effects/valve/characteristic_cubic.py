@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, parameter
+from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, Start, parameter
 from stiction_ros.effects.seen import Seen
 from stiction_ros.effects.valve.characteristic import Characteristic
 
@@ -26,17 +26,11 @@ class CubicCharacteristic(Behaviour):
     below it at 79 %. An equal-percentage valve in a pipe that resists, or one with a plug of any
     other form, bends like that where no rangeability tells its curve. The cubic goes on beyond 0
     and 100 %.
-
-    Raises:
-        InputError: a figure out of range.
     """
 
     effect: ClassVar[str] = Characteristic.effect
     law: ClassVar[str | None] = "cubic"
     places: ClassVar[tuple[str, ...]] = Characteristic.places
-    signature: ClassVar[str] = Characteristic.signature
-    minimum_data: ClassVar[str] = Characteristic.minimum_data
-    confusable: ClassVar[tuple[str, ...]] = Characteristic.confusable
     experiment: ClassVar[str] = Characteristic.experiment
     separation: ClassVar[str] = Characteristic.separation
     least: ClassVar[float] = 1.9
@@ -63,11 +57,6 @@ class CubicCharacteristic(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return outputs, shape (N, G), for rows (bend, skew)."""
         return np.asarray(values[:, None] + cls.shapes(values) @ grid.T)

@@ -14,6 +14,7 @@ from stiction_ros.effects.behaviour import (
     Filter,
     FloatArray,
     Memory,
+    Start,
     elapsed,
     parameter,
     starts,
@@ -30,21 +31,10 @@ class Lag(Behaviour):
 
     The memory is (y, time of the last sample). At the first sample no time has passed, so
     the signal is where it rested. τ = 0 leaves the signal as it is.
-
-    Raises:
-        InputError: a negative or non-finite time constant.
     """
 
     effect: ClassVar[str] = "lag"
     places: ClassVar[tuple[str, ...]] = ("valve", "sensor")
-    signature: ClassVar[str] = "PV answers every move later and smoother than the model"
-    minimum_data: ClassVar[str] = "set-point moves or other fast moves of OP"
-    confusable: ClassVar[tuple[str, ...]] = (
-        "valve lag",
-        "process pole",
-        "sensor lag",
-        "process delay",
-    )
     experiment: ClassVar[str] = "move the set-point in steps"
     separation: ClassVar[str] = (
         "record the stem position: a slow valve shows there; move the sensor or compare it with "
@@ -63,7 +53,6 @@ class Lag(Behaviour):
         return (value, NO_SAMPLE)
 
     def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
-        """Return the memory (y, time) and y."""
         assert isinstance(memory, tuple)
         last, before = memory
         share = -math.expm1(-_ratio(elapsed(before, time), self.time_constant))
@@ -72,13 +61,8 @@ class Lag(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return outputs, shape (N, G), for rows (tau,)."""
         from stiction_ros.effects.grid_kernels import lagged  # compiled: slow to import
 
         share = np.array([-math.expm1(-_ratio(sample_time, tau)) for tau in grid[:, 0].tolist()])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, parameter
+from stiction_ros.effects.behaviour import Behaviour, Memory, parameter
 
 
 @dataclasses.dataclass(frozen=True)
@@ -14,9 +14,6 @@ class Offset(Behaviour):
 
     effect: ClassVar[str] = "offset"
     places: ClassVar[tuple[str, ...]] = ("valve",)
-    signature: ClassVar[str] = "OP and PV at rest differ from the model by a constant"
-    minimum_data: ClassVar[str] = "an operating point that is known from elsewhere"
-    confusable: ClassVar[tuple[str, ...]] = ("load step", "disturbance step", "sensor bias_step")
     experiment: ClassVar[str] = (
         "measure the stem: a constant offset is taken up by the operating point"
     )
@@ -29,14 +26,3 @@ class Offset(Behaviour):
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
         return memory, value + self.size
-
-    @classmethod
-    def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
-    ) -> FloatArray:
-        """Return outputs, shape (N, G), for rows (size,)."""
-        return values[:, None] + grid[:, 0]

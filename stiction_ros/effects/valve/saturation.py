@@ -11,17 +11,10 @@ from stiction_ros.effects.limits import Limits
 
 @dataclasses.dataclass(frozen=True)
 class Saturation(Limits):
-    """A stem that stops at ``low`` and ``high``, inside of what OP asks.
-
-    Raises:
-        InputError: limits that are not finite, or low > high.
-    """
+    """A stem that stops at ``low`` and ``high``, inside of what OP asks."""
 
     effect: ClassVar[str] = "saturation"
     places: ClassVar[tuple[str, ...]] = ("valve",)
-    signature: ClassVar[str] = "PV does not answer while OP is beyond one value"
-    minimum_data: ClassVar[str] = "OP stays beyond a limit for longer than the process settles"
-    confusable: ClassVar[tuple[str, ...]] = ("valve characteristic",)
     experiment: ClassVar[str] = "drive OP towards the limit and hold it there until PV settles"
     bends: ClassVar[bool] = True
 

@@ -12,6 +12,7 @@ from stiction_ros.effects.behaviour import (
     Behaviour,
     FloatArray,
     Memory,
+    Start,
     elapsed,
     parameter,
     starts,
@@ -28,16 +29,10 @@ class Slew(Behaviour):
 
     The memory is (χ, time of the last sample). At the first sample no time has passed, so
     the stem is where it rested.
-
-    Raises:
-        InputError: a negative or non-finite rate.
     """
 
     effect: ClassVar[str] = "slew"
     places: ClassVar[tuple[str, ...]] = ("valve",)
-    signature: ClassVar[str] = "the stem ramps at one speed after large moves of OP, however large"
-    minimum_data: ClassVar[str] = "moves of OP of many times rate times sample time"
-    confusable: ClassVar[tuple[str, ...]] = ("valve lag", "process pole", "sensor lag")
     experiment: ClassVar[str] = "move the set-point so far that OP moves fast"
 
     rate: float = parameter("rate", "%/s", "largest speed of the stem", low=0.0)
@@ -50,7 +45,6 @@ class Slew(Behaviour):
         return (value, NO_SAMPLE)
 
     def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
-        """Return the memory (χ, time) and the stem position χ."""
         assert isinstance(memory, tuple)
         stem, before = memory
         reach = self.rate * elapsed(before, time)
@@ -59,13 +53,8 @@ class Slew(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls,
-        grid: FloatArray,
-        values: FloatArray,
-        start: FloatArray | float,
-        sample_time: float = 1.0,
+        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return stem positions, shape (N, G), for rows (rate,)."""
         from stiction_ros.effects.grid_kernels import slewing  # compiled: slow to import
 
         reach = grid[:, 0] * sample_time

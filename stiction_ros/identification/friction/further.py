@@ -82,7 +82,7 @@ class Range:
 
 def ranges_of(law: type[FrictionLaw]) -> tuple[Range, ...]:
     """Return where the parameters of a law behind its first two are searched."""
-    fields = {f.name: f.default for f in dataclasses.fields(law)}  # type: ignore[arg-type]
+    fields = {f.name: f.default for f in dataclasses.fields(law)}
     found = []
     for entry in law.parameters()[2:]:
         default = fields[entry.attribute]

@@ -25,7 +25,6 @@ import numpy as np
 from stiction_ros.effects import FrictionLaw, HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.friction.moving_rules import MovingRules
-from stiction_ros.effects.friction.switching import MovingCells
 from stiction_ros.errors import InputError
 from stiction_ros.identification.friction.further import first_values
 from stiction_ros.identification.kernels.step import he_pattern_steps
@@ -101,7 +100,7 @@ def require_cells(law: type[FrictionLaw]) -> None:
 
 def moving_rules(law: type[FrictionLaw], u: FloatArray) -> MovingRules | None:
     """Return how a valve with a moving state follows OP u, (N,); None for other laws."""
-    return law.switching.rules(u) if isinstance(law.switching, MovingCells) else None
+    return law.switching(u) if isinstance(law.switching, type) else None
 
 
 def beginning_of(

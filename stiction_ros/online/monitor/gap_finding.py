@@ -100,6 +100,9 @@ def _sentence(found: Discrepancy, effects: Sequence[str]) -> str:
         return "; ".join((*effects, rest))
     if effects:
         return "; ".join(effects)
+    if found.process_changes and not found.alternatives:
+        said = (f"process to {each.output}: {each.sentence}" for each in found.process_changes)
+        return "; ".join(said)
     return "one of " + ", ".join(_named(place, effect) for place, effect in found.alternatives)
 
 

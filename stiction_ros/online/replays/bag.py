@@ -14,10 +14,9 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.bag.run_metadata import mapping_of
-from stiction_ros.records.run.bag_reader import JOINT_STATE
 from stiction_ros.records.run.bag_runs import tell_runs
-from stiction_ros.records.run.gap_log import GapLog, gap_log
-from stiction_ros.records.run.log import Fit, ModeChange, fits, mode_changes
+from stiction_ros.records.run.events import Fit, GapLog, ModeChange, fits, gap_log, mode_changes
+from stiction_ros.records.run.loop_signals import JOINT_STATE
 from stiction_ros.records.storage.bag_metadata import BagTopic
 
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"

@@ -18,7 +18,7 @@ from stiction_ros.online.input.samples import Sample
 from stiction_ros.online.input.signal_check import SignalCheck
 from stiction_ros.online.node_settings import ControllerNodeSettings
 from stiction_ros.online.replays.bag import ReplayBag
-from stiction_ros.records.run.log import ModeChange
+from stiction_ros.records.run.events import ModeChange
 
 SECOND = 10**9
 

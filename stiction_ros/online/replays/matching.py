@@ -10,7 +10,7 @@ from typing import Any
 from stiction_ros.online.replays.bag import PublishedFit, ReplayBag
 from stiction_ros.online.replays.estimator import ReplayedFit
 from stiction_ros.online.replays.result import FitMatch, Match, ModeMatch
-from stiction_ros.records.run.log import ModeChange
+from stiction_ros.records.run.events import ModeChange
 from stiction_ros.texts import json_text
 
 _TIMES = ("seconds",)  # wall time of a fit is another each time

@@ -10,7 +10,7 @@ from typing import Any
 from stiction_ros.online.replays.bag import ReplayBag
 from stiction_ros.online.replays.controller import SECOND, OpMatch
 from stiction_ros.online.replays.estimator import ReplayedFit
-from stiction_ros.records.run.log import ModeChange
+from stiction_ros.records.run.events import ModeChange
 from stiction_ros.texts import finite
 
 

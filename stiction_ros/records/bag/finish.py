@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from mcap.writer import CompressionType, Writer
+
+from stiction_ros.errors import InputError
 from stiction_ros.records.bag.run_metadata import RUN, custom_data, merged
 from stiction_ros.records.storage.bag_metadata import (
     BagFile,
@@ -17,11 +21,15 @@ from stiction_ros.records.storage.bag_metadata import (
 )
 from stiction_ros.records.storage.files import METADATA, found_files
 from stiction_ros.records.storage.log_time import SIMULATED
-from stiction_ros.records.storage.mcap_chunked import ChunkedFile
 from stiction_ros.records.storage.mcap_scan import McapScan
 
 CLOCK = "/clock"
 ROSBAG2 = "rosbag2"
+COMPRESSIONS = {
+    "zstd": CompressionType.ZSTD,
+    "lz4": CompressionType.LZ4,
+    "none": CompressionType.NONE,
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,10 +39,20 @@ class Packing:
     Attributes:
         compression: ``zstd``, ``lz4`` or ``none``.
         chunk_size: bytes of messages in one chunk before compression.
+
+    Raises:
+        InputError: another compression.
     """
 
     compression: str = "zstd"
     chunk_size: int = 1 << 18
+
+    def __post_init__(self) -> None:
+        if self.compression not in COMPRESSIONS:
+            raise InputError(
+                f"compression {self.compression!r} is not known",
+                fix=f"use {', '.join(COMPRESSIONS)}",
+            )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,18 +151,22 @@ def rewrite(
     partial = path.with_suffix(".mcap.part")
     try:
         with partial.open("wb") as output:
-            target = ChunkedFile(
-                output, compression=packing.compression, chunk_size=packing.chunk_size
+            target = Writer(
+                output,
+                chunk_size=packing.chunk_size,
+                compression=COMPRESSIONS[packing.compression],
+                use_summary_offsets=False,  # it writes them for groups that are empty, too
+                enable_data_crcs=True,
             )
-            channels = _copy(scan, target, cap)
-            content = _content(path, scan, target, channels)
+            target.start("ros2", "stiction_ros")
+            content = content_of(_copy(scan, target, cap), scan)
             if content.run:
-                target.metadata(RUN, content.run)
+                target.add_metadata(RUN, dict(content.run))
             for name, mapping in scan.metadata:
                 if name not in (RUN, ROSBAG2):
-                    target.metadata(name, mapping)
-            target.metadata(ROSBAG2, metadata_record(_information([content])))
-            target.finish()
+                    target.add_metadata(name, mapping)
+            target.add_metadata(ROSBAG2, metadata_record(_information([content])))
+            target.finish()  # type: ignore[no-untyped-call]
             output.flush()
             os.fsync(output.fileno())
         os.replace(partial, path)
@@ -164,34 +186,41 @@ def write_listing(directory: Path, contents: Sequence[FileContent]) -> None:
     os.replace(partial, directory / METADATA)  # a reader sees the old one or the new one
 
 
-def _copy(scan: McapScan, target: ChunkedFile, cap: int | None) -> dict[BagTopic, int]:
-    """Copy all messages and topics; return the channels of the topics."""
+def _copy(scan: McapScan, target: Writer, cap: int | None) -> BagFile:
+    """Copy all messages and topics; return what was written."""
+    schemas: dict[tuple[str, str, str], int] = {}
     channels: dict[BagTopic, int] = {}
+    counts: Counter[str] = Counter()
+    first: int | None = None
+    last: int | None = None
+
+    def announce() -> None:
+        for topic in scan.topics.values():
+            if topic in channels:
+                continue
+            key = (topic.type, topic.schema_encoding, topic.definition)
+            if key not in schemas:
+                schemas[key] = target.register_schema(*key[:2], topic.definition.encode())
+            channels[topic] = target.register_channel(
+                topic.name, topic.encoding, schemas[key], topic.channel_metadata()
+            )
+            counts[topic.name] += 0
+
     for topic, log_time, publish_time, data in scan.messages():
-        channel = channels.get(topic)
-        if channel is None:
-            channel = channels[topic] = target.topic(topic)
+        if len(channels) < len(scan.topics):
+            announce()
         if cap is not None:
             if log_time <= cap:
                 cap = None
             else:
                 log_time = cap
-        target.message(channel, log_time, publish_time, data)
-    for topic in scan.topics.values():
-        if topic not in channels:
-            channels[topic] = target.topic(topic)
-    return channels
-
-
-def _content(
-    path: Path, scan: McapScan, target: ChunkedFile, channels: Mapping[BagTopic, int]
-) -> FileContent:
-    counts: dict[str, int] = {}
-    for topic, channel in channels.items():
-        counts[topic.name] = counts.get(topic.name, 0) + target.counts[channel]
-    first, last = target.span()
-    file = BagFile(path.name, counts, first, last)
-    return content_of(file, scan)
+        sequence = counts[topic.name] & 0xFFFFFFFF
+        target.add_message(channels[topic], log_time, data, publish_time, sequence)
+        counts[topic.name] += 1
+        first = log_time if first is None else min(first, log_time)
+        last = log_time if last is None else max(last, log_time)
+    announce()
+    return BagFile(scan.path.name, counts, first, last)
 
 
 def content_of(file: BagFile, scan: McapScan) -> FileContent:

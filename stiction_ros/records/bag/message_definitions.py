@@ -25,23 +25,20 @@ def default_prefixes() -> tuple[str, ...]:
     return tuple(dict.fromkeys([*listed, sys.prefix]))
 
 
-def definition(type_name: str, prefixes: Sequence[str | Path] | None = None) -> tuple[str, str]:
+def definition(type_name: str) -> tuple[str, str]:
     """Return a message's definition as a bag holds it, and the hash of its type.
 
     Args:
         type_name: ``sensor_msgs/msg/JointState`` or ``sensor_msgs/JointState``.
-        prefixes: installation prefixes; :func:`default_prefixes` when not given.
 
     Returns:
         The text of the ``.msg`` file followed by those it depends on, each after a line
         of 80 ``=`` and ``MSG: package/Name``; and the ``RIHS01_…`` hash.
 
     Raises:
-        InputError: no such message under the prefixes.
+        InputError: no such message under :func:`default_prefixes`.
     """
-    if prefixes is None:
-        prefixes = default_prefixes()
-    return _definition(type_name, tuple(str(prefix) for prefix in prefixes))
+    return _definition(type_name, default_prefixes())
 
 
 @functools.lru_cache(maxsize=256)

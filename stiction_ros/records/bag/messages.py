@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import bisect
 import dataclasses
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +16,10 @@ from mcap_ros2.decoder import DecoderFactory
 from stiction_ros.errors import InputError
 from stiction_ros.records.storage.bag_metadata import BagTopic
 from stiction_ros.records.storage.files import listing_notes, storage_files
+from stiction_ros.records.storage.log_time import AGAIN
 from stiction_ros.records.storage.mcap_scan import McapScan, RawMessage
 
-__all__ = [
-    "BagMessage",
-    "MessageDecoder",
-    "last_part",
-    "read_messages",
-    "read_raw",
-    "stamp_ns",
-    "storage_files",
-]
-
+_log_time = itemgetter(1)
 Wanted = Callable[[BagTopic], bool]
 
 
@@ -49,7 +43,7 @@ class BagMessage:
 
 
 def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMessage]:
-    """Yield every message of a bag as bytes, each file by log time, see :class:`LogOrder`.
+    """Yield every message of a bag as bytes, each file by log time.
 
     Args:
         path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
@@ -61,7 +55,7 @@ def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMe
     counts: Counter[str] = Counter()
     for file in storage_files(path):
         scan = McapScan(file)
-        yield from scan.messages(by_log_time=True)
+        yield from _by_log_time(scan)
         for channel, count in scan.counts.items():
             counts[scan.topics[channel].name] += count
         if notes is not None:
@@ -70,16 +64,61 @@ def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMe
         notes.extend(listing_notes(path, counts))
 
 
+def _by_log_time(scan: McapScan) -> Iterator[RawMessage]:
+    """Yield the messages of a file by log time, those of one log time as they stand in the file.
+
+    A journal keeps the order in which it was written: its log times are of the wall until simulated
+    time is known, and never out of order. So does a file in which log time begins anew.
+    """
+    held: list[RawMessage] = []
+    damage = None
+    try:
+        for message in scan.messages():
+            held.append(message)
+    except InputError as error:
+        damage = error
+    if (scan.chunked or scan.finished) and not _begins_anew(held):
+        held.sort(key=_log_time)
+    yield from held
+    if damage is not None:
+        raise damage
+
+
+def _begins_anew(messages: Iterable[RawMessage]) -> bool:
+    """Tell whether log time begins anew, as simulated time does when a plant is restarted.
+
+    Then older times of a topic come one after the other, and fall between those that it had
+    before. By log time such runs would be mixed.
+    """
+    known: dict[str, list[int]] = {}
+    older: dict[str, list[int]] = {}
+    for topic, time, _, _ in messages:
+        times, run = known.setdefault(topic.name, []), older.setdefault(topic.name, [])
+        if not times or time >= times[-1]:
+            times.append(time)
+            run.clear()
+            continue
+        bisect.insort(times, time)
+        if run and time <= run[-1]:
+            run.clear()
+        run.append(time)
+        if len(run) == AGAIN:
+            between = bisect.bisect_right(times, time) - bisect.bisect_left(times, run[0])
+            if between > AGAIN:
+                return True
+            run.clear()
+    return False
+
+
 def read_messages(
     path: str | Path, *, wanted: Wanted | None = None, notes: list[str] | None = None
 ) -> Iterator[BagMessage]:
     """Yield the decoded messages of a bag in the order of :func:`read_raw`.
 
     Args:
-        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
+        path: as there.
         wanted: which topics to decode and yield; all when not given.
-        notes: gets what was left out, one sentence each; topics that are not in CDR with
-            ``ros2msg`` definitions are among them.
+        notes: as there; with topics that are not in CDR with ``ros2msg`` definitions.
 
     Raises:
         InputError: no such bag, damaged, or a message that does not fit its definition.

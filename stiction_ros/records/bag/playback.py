@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import yaml
@@ -29,14 +30,14 @@ class BagContent:
     """What there is to play in a bag.
 
     Attributes:
+        messages: in the order of the bag.
         topics: by name.
-        counts: messages by topic name.
         first, last: least and largest log time, ns.
         notes: what was left out while reading, one sentence each.
     """
 
+    messages: Sequence[RawMessage]
     topics: Mapping[str, BagTopic]
-    counts: Mapping[str, int]
     first: int
     last: int
     notes: tuple[str, ...]
@@ -48,7 +49,7 @@ class BagContent:
 
 
 def bag_content(path: str | Path, wanted: str = ".*") -> BagContent:
-    """Read a bag once and say what is in it.
+    """Read a bag.
 
     Args:
         path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
@@ -57,21 +58,19 @@ def bag_content(path: str | Path, wanted: str = ".*") -> BagContent:
     Raises:
         InputError: no such bag, damaged, no regular expression, or no message to play.
     """
+    try:
+        pattern = re.compile(wanted)
+    except re.error as error:
+        raise InputError(f"no regular expression ({error})", where="topics") from None
     notes: list[str] = []
-    topics: dict[str, BagTopic] = {}
-    counts: dict[str, int] = {}
-    first = last = 0
-    for raw in _chosen(path, wanted, notes):
-        name = raw.topic.name
-        first = min(first, raw.log_time) if counts else raw.log_time
-        last = max(last, raw.log_time)
-        topics.setdefault(name, raw.topic)
-        counts[name] = counts.get(name, 0) + 1
-    if not counts:
+    messages = [raw for raw in read_raw(path, notes) if pattern.fullmatch(raw.topic.name)]
+    if not messages:
         raise InputError(
             "holds no message to play", where=str(path), fix=f"its topics must match {wanted!r}"
         )
-    return BagContent(topics, counts, first, last, tuple(notes))
+    topics = {topic.name: topic for topic in dict.fromkeys(raw.topic for raw in messages)}
+    times = [raw.log_time for raw in messages]
+    return BagContent(messages, topics, min(times), max(times), tuple(notes))
 
 
 def offered_qos(topic: BagTopic) -> Qos:
@@ -111,35 +110,6 @@ def _word(key: str, value: object) -> str:
     return value.lower() if isinstance(value, str) else _NUMBERED[key][int(str(value))]
 
 
-def _chosen(path: str | Path, wanted: str, notes: list[str] | None = None) -> Iterator[RawMessage]:
-    try:
-        pattern = re.compile(wanted)
-    except re.error as error:
-        raise InputError(f"no regular expression ({error})", where="topics") from None
-    matches: dict[str, bool] = {}
-    for raw in read_raw(path, notes):
-        name = raw.topic.name
-        if name not in matches:
-            matches[name] = bool(pattern.fullmatch(name))
-        if matches[name]:
-            yield raw
-
-
-@dataclasses.dataclass(frozen=True)
-class PlaybackOptions:
-    """How a bag is played.
-
-    Attributes:
-        rate: recorded seconds per second of the clock, above 0.
-        start: seconds of recorded time that are passed over at the beginning.
-        loop: whether to begin again at the end.
-    """
-
-    rate: float = 1.0
-    start: float = 0.0
-    loop: bool = False
-
-
 class Playback:
     """Plays the messages of a bag in their order, each when its log time has come.
 
@@ -147,11 +117,11 @@ class Playback:
     given out first, so that late topics such as a loop model are there from the beginning.
 
     Args:
-        path: the bag.
-        content: of the bag, from :func:`bag_content` with the same ``wanted``.
+        content: of the bag.
         clock: a steady clock, ns.
-        options: rate, start, loop.
-        wanted: regular expression of the full topic names to play.
+        rate: recorded seconds per second of the clock, above 0.
+        start: seconds of recorded time that are passed over at the beginning.
+        loop: whether to begin again at the end.
 
     Raises:
         InputError: a rate that is not positive, or a start beyond the end.
@@ -159,35 +129,27 @@ class Playback:
 
     def __init__(
         self,
-        path: str | Path,
         content: BagContent,
         clock: Callable[[], int],
-        options: PlaybackOptions = PlaybackOptions(),
-        wanted: str = ".*",
+        rate: float = 1.0,
+        start: float = 0.0,
+        loop: bool = False,
     ) -> None:
-        if not 0.0 < options.rate < float("inf"):
-            raise InputError(f"{options.rate:g} is no rate", where="rate", fix="use one above 0")
-        if not 0.0 <= options.start <= content.seconds:
+        if not 0.0 < rate < float("inf"):
+            raise InputError(f"{rate:g} is no rate", where="rate", fix="use one above 0")
+        if not 0.0 <= start <= content.seconds:
             raise InputError(
-                f"{options.start:g} s is not within the bag, which lasts {content.seconds:g} s",
+                f"{start:g} s is not within the bag, which lasts {content.seconds:g} s",
                 where="start",
             )
-        self._path, self._wanted, self._clock = path, wanted, clock
-        self._bag_time = self._since = 0
-        self._begin = content.first + round(options.start * SECOND)
-        self._latched = {
-            name: offered_qos(topic).depth
-            for name, topic in content.topics.items()
-            if offered_qos(topic).durability == "transient_local"
-        }
-        self._rate, self._loop = options.rate, options.loop
+        self._clock = clock
+        self._begin = content.first + round(start * SECOND)
+        self._messages = _from(content, self._begin)
+        self._rate, self._loop = rate, loop
         self.paused = True
         self.finished = False
-        self.rounds = 0
-        self.played = 0
-        self._next: RawMessage | None = None
-        self._messages: Iterator[RawMessage] = iter(())
-        self._rewind()
+        self.rounds = self.played = self._place = 0
+        self._bag_time, self._since = self._begin, clock()
 
     @property
     def time(self) -> int:
@@ -225,10 +187,11 @@ class Playback:
         if not self.paused:
             return found
         round_before = self.rounds
-        while self._next is not None and self.rounds == round_before:
-            if found and self._next.log_time != found[0].log_time:
+        while not self.finished and self.rounds == round_before:
+            time = self._messages[self._place].log_time
+            if found and time != found[0].log_time:
                 break
-            self._bag_time = max(self._bag_time, self._next.log_time)
+            self._bag_time = max(self._bag_time, time)
             found.append(self._take())
         return found
 
@@ -238,17 +201,17 @@ class Playback:
         if self.paused:
             return found
         now, round_before = self.time, self.rounds
-        while self._next is not None and self.rounds == round_before and len(found) < most:
-            if self._next.log_time > now:
+        while not self.finished and self.rounds == round_before and len(found) < most:
+            if self._messages[self._place].log_time > now:
                 break
             found.append(self._take())
         return found
 
     def _take(self) -> RawMessage:
-        assert self._next is not None
-        message, self._next = self._next, next(self._messages, None)
+        message = self._messages[self._place]
+        self._place += 1
         self.played += 1
-        if self._next is None:
+        if self._place == len(self._messages):
             if self._loop:
                 self.rounds += 1
                 self._rewind()
@@ -257,31 +220,24 @@ class Playback:
         return message
 
     def _rewind(self) -> None:
-        self._bag_time, self._since = self._begin, self._clock()
-        messages = _chosen(self._path, self._wanted)
-        held: dict[str, deque[RawMessage]] = {}
-        self._next = next(messages, None)
-        while self._next is not None and self._next.log_time < self._begin:
-            name = self._next.topic.name
-            if name in self._latched:
-                held.setdefault(name, deque(maxlen=self._latched[name])).append(self._next)
-            self._next = next(messages, None)
-        self._messages = _joined(held, self._next, messages)
-        self._next = next(self._messages, None)
+        self._bag_time, self._since, self._place = self._begin, self._clock(), 0
 
     def _anchor(self) -> None:
         self._bag_time, self._since = self.time, self._clock()
 
 
-def _joined(
-    held: Mapping[str, deque[RawMessage]], first: RawMessage | None, rest: Iterator[RawMessage]
-) -> Iterator[RawMessage]:
-    """Yield what is latched, in the order it was recorded, and then what follows."""
-    yield from sorted((m for messages in held.values() for m in messages), key=_log_time)
-    if first is not None:
-        yield first
-    yield from rest
-
-
-def _log_time(message: RawMessage) -> int:
-    return message.log_time
+def _from(content: BagContent, begin: int) -> list[RawMessage]:
+    """Return the messages from a log time on, after those that are latched before it."""
+    held: dict[str, deque[RawMessage]] = {}
+    for name, topic in content.topics.items():
+        qos = offered_qos(topic)
+        if qos.durability == "transient_local":
+            held[name] = deque(maxlen=qos.depth)
+    place = 0
+    while place < len(content.messages) and content.messages[place].log_time < begin:
+        message = content.messages[place]
+        if message.topic.name in held:
+            held[message.topic.name].append(message)
+        place += 1
+    latched = itertools.chain(*held.values())
+    return [*sorted(latched, key=lambda message: message.log_time), *content.messages[place:]]

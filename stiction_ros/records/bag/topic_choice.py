@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from stiction_ros.errors import InputError
 
@@ -14,50 +13,31 @@ OWN = "own"
 GLOBAL = ("clock", "diagnostics", "parameter_events", "rosout")
 
 
-@dataclasses.dataclass(frozen=True)
-class TopicChoice:
-    """A list of names and two regular expressions.
+def topic_choice(
+    names: Sequence[str], regex: str, exclude: str, namespace: str = "/"
+) -> Callable[[str], bool]:
+    """Return what tells whether a topic is taken; an empty expression fits nothing.
 
-    Attributes:
-        names: full names that are wanted in any case.
-        regex: of the full names that are wanted, None for none.
-        exclude: of the full names that are left out, also when ``names`` has them.
+    Args:
+        names: full names.
+        regex: of full names; :data:`OWN` for the loop of the namespace.
+        exclude: of full names that are left out, also when ``names`` has them.
+        namespace: of the recorder.
+
+    Raises:
+        InputError: no regular expression, or nothing is chosen at all.
     """
-
-    names: frozenset[str]
-    regex: re.Pattern[str] | None
-    exclude: re.Pattern[str] | None
-
-    @classmethod
-    def of(
-        cls, names: Sequence[str], regex: str, exclude: str, namespace: str = "/"
-    ) -> TopicChoice:
-        """Build a choice from what parameters say; an empty expression fits nothing.
-
-        Args:
-            names: full names.
-            regex: of full names; :data:`OWN` for the loop of the namespace.
-            exclude: of full names.
-            namespace: of the recorder.
-
-        Raises:
-            InputError: no regular expression, or nothing is chosen at all.
-        """
-        if not names and not regex:
-            raise InputError("no topic is chosen", where="recorder", fix="set topics or regex")
-        if regex == OWN:
-            own = re.escape(namespace.rstrip("/"))
-            regex = f"{own}/.*|/({'|'.join(GLOBAL)})" if own else ".*"
-        return cls(frozenset(names), _compiled(regex, "regex"), _compiled(exclude, "exclude_regex"))
-
-    def __contains__(self, topic: str) -> bool:
-        if self.exclude is not None and self.exclude.fullmatch(topic):
-            return False
-        return topic in self.names or (self.regex is not None and bool(self.regex.fullmatch(topic)))
+    if not names and not regex:
+        raise InputError("no topic is chosen", where="recorder", fix="set topics or regex")
+    if regex == OWN:
+        own = re.escape(namespace.rstrip("/"))
+        regex = f"{own}/.*|/({'|'.join(GLOBAL)})" if own else ".*"
+    fits, left_out = _fitting(regex, "regex"), _fitting(exclude, "exclude_regex")
+    return lambda topic: not left_out(topic) and (topic in names or bool(fits(topic)))
 
 
-def _compiled(text: str, key: str) -> re.Pattern[str] | None:
+def _fitting(text: str, key: str) -> Callable[[str], re.Match[str] | None]:
     try:
-        return re.compile(text) if text else None
+        return re.compile(text).fullmatch if text else lambda _: None
     except re.error as error:
         raise InputError(f"no regular expression ({error})", where=f"recorder: {key}") from None

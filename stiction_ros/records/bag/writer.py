@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 
-from mcap.records import Channel, Metadata, Schema
+from mcap.records import Channel, Message, Metadata, Schema
 
 from stiction_ros import __version__
 from stiction_ros.errors import InputError
@@ -29,8 +29,6 @@ from stiction_ros.records.storage.bag_metadata import (
     metadata_record,
     qos_yaml,
 )
-from stiction_ros.records.storage.mcap_chunked import COMPRESSIONS
-from stiction_ros.records.storage.mcap_format import MESSAGE, MESSAGE_HEAD, MESSAGE_RECORD
 from stiction_ros.records.storage.mcap_journal import Journal
 
 __all__ = ["BagWriter", "Packing", "Qos", "Splitting"]
@@ -74,7 +72,7 @@ class BagWriter:
     nanoseconds.
 
     Raises:
-        InputError: the directory holds something already; an unknown compression.
+        InputError: the directory holds something already.
     """
 
     def __init__(
@@ -83,11 +81,6 @@ class BagWriter:
         packing: Packing = Packing(),  # noqa: B008 (frozen)
         splitting: Splitting = Splitting(),
     ) -> None:
-        if packing.compression not in COMPRESSIONS:
-            raise InputError(
-                f"compression {packing.compression!r} is not known",
-                fix=f"use {', '.join(COMPRESSIONS)}",
-            )
         self.directory = Path(directory)
         self._packing = packing
         self._splitting = splitting
@@ -162,15 +155,8 @@ class BagWriter:
             raise InputError(f"topic {topic} was not added", where=str(self.directory)) from None
         if self._limited and self._is_full(log_time):
             self._go_on()
-        head = MESSAGE_RECORD.pack(
-            MESSAGE,
-            MESSAGE_HEAD.size + len(data),
-            entry.channel,
-            entry.count & 0xFFFFFFFF,
-            log_time,
-            publish_time,
-        )
-        self._journal.append(head + data)
+        sequence = entry.count & 0xFFFFFFFF
+        self._journal.put(Message(entry.channel, log_time, data, publish_time, sequence))
         entry.count += 1
         if entry.tells:
             self._learn(news(topic, entry.topic.type, data))

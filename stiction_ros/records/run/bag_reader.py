@@ -5,39 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.messages import BagMessage, read_messages, read_raw
-from stiction_ros.records.parts import only_part
+from stiction_ros.records.bag.messages import read_messages
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.loop_runs import LoopRun, loop_runs
-from stiction_ros.records.run.loop_signals import JOINT_STATE, LoopSignals, is_signal
+from stiction_ros.records.run.loop_runs import loop_runs
+from stiction_ros.records.run.loop_signals import LoopSignals, is_signal
 from stiction_ros.records.whole import Source
-
-__all__ = [
-    "JOINT_STATE",
-    "BagMessage",
-    "LoopRun",
-    "LoopSignals",
-    "bag_source",
-    "is_signal",
-    "read_bag",
-    "read_bag_loops",
-    "read_bag_parts",
-    "read_messages",
-    "read_raw",
-]
-
-
-def read_bag(path: str | Path, *, namespace: str | None = None) -> Record:
-    """Read the record of a loop from ``pv``, ``sp``, ``op``, ``stem`` in a bag.
-
-    Args:
-        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
-        namespace: of the loop's topics; needed when the bag holds several loops.
-
-    Raises:
-        InputError: as :func:`read_bag_parts`; gaps, several runs.
-    """
-    return only_part(read_bag_parts(path, namespace=namespace), str(path))
 
 
 def read_bag_parts(path: str | Path, *, namespace: str | None = None) -> tuple[Record, ...]:
@@ -53,40 +25,24 @@ def read_bag_parts(path: str | Path, *, namespace: str | None = None) -> tuple[R
     Raises:
         InputError: as :func:`read_messages`; no ``pv`` or ``op``; stamps that are irregular.
     """
-    notes: list[str] = []
-    signals = LoopSignals(str(path))
-    for number, message in enumerate(read_messages(path, wanted=is_signal, notes=notes)):
-        signals.add(message, number)
-    runs = loop_runs(signals, bag_source(path), namespace, notes)
-    return tuple(part for run in runs for part in run.parts)
+    return _parts(path, *_signals(path), namespace)
 
 
 def read_bag_loops(path: str | Path) -> dict[str, tuple[Record, ...] | InputError]:
-    """Read the records of every loop in a bag.
-
-    Args:
-        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
+    """Read the records of every loop in a bag, as :func:`read_bag_parts`.
 
     Returns:
-        Namespace of each loop, such as ``/unit1``, to its records as :func:`read_bag_parts` has
-        them, or to the reason why there are none.
-
-    Raises:
-        InputError: as :func:`read_messages`.
+        Namespace of each loop, such as ``/unit1``, to its records, or to the reason why there are
+        none.
     """
-    notes: list[str] = []
-    signals = LoopSignals(str(path))
-    for number, message in enumerate(read_messages(path, wanted=is_signal, notes=notes)):
-        signals.add(message, number)
+    signals, notes = _signals(path)
     found: dict[str, tuple[Record, ...] | InputError] = {}
     for space in signals.loops or ("",):
-        chosen = (space or "/") if signals.loops else None
         try:
-            runs = loop_runs(signals, bag_source(path), chosen, notes)
+            chosen = (space or "/") if signals.loops else None
+            found[space] = _parts(path, signals, notes, chosen)
         except InputError as error:
             found[space] = error
-            continue
-        found[space] = tuple(part for run in runs for part in run.parts)
     return found
 
 
@@ -95,3 +51,19 @@ def bag_source(path: str | Path) -> Source:
     return Source(
         Path(path).name, str(path), lambda row: f"sample {row} of pv and op", cut_holes=True
     )
+
+
+def _signals(path: str | Path) -> tuple[LoopSignals, list[str]]:
+    """Return the signals of all loops in a bag, and what was left out while reading."""
+    notes: list[str] = []
+    signals = LoopSignals(str(path))
+    for number, message in enumerate(read_messages(path, wanted=is_signal, notes=notes)):
+        signals.add(message, number)
+    return signals, notes
+
+
+def _parts(
+    path: str | Path, signals: LoopSignals, notes: list[str], namespace: str | None
+) -> tuple[Record, ...]:
+    runs = loop_runs(signals, bag_source(path), namespace, notes)
+    return tuple(part for run in runs for part in run.parts)

@@ -1,13 +1,15 @@
-"""What the nodes of a live loop said besides its signals: estimates, modes, texts."""
+"""What the nodes of a live loop said besides its signals: estimates, modes, gaps, texts."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
+import math
 import types
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +23,7 @@ _DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 _STRING = "std_msgs/msg/String"
 _CLOCK = "rosgraph_msgs/msg/Clock"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+FIGURES = ("p50", "p99", "p999", "max")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,6 +88,27 @@ class Text:
     text: str
 
 
+@dataclasses.dataclass(frozen=True)
+class GapLog:
+    """What the monitor told, by the end of its window in ns.
+
+    Attributes:
+        looks: documents of the measurements.
+        findings: documents of what the workflow found.
+    """
+
+    looks: Mapping[int, Mapping[str, Any]]
+    findings: Mapping[int, Mapping[str, Any]]
+
+
+class _Status(NamedTuple):
+    """One diagnostic status: its stamp in ns, the node that gave it, and its keys."""
+
+    stamp: int
+    node: str
+    values: Mapping[str, str]
+
+
 def of_loop(messages: Iterable[BagMessage], space: str) -> list[BagMessage]:
     """Return the messages of the loop in the namespace ``space``, and what is global.
 
@@ -127,39 +151,45 @@ def estimates(messages: Iterable[BagMessage]) -> tuple[Estimate, ...]:
 def mode_changes(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
     """Return the changes of mode, model or friction in ``/diagnostics``, with swap times."""
     changes: list[ModeChange] = []
-    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
-        for status in message.message.status:
-            values = {item.key: item.value for item in status.values}
-            if "mode" not in values:
-                continue
-            change = ModeChange(
-                stamp_ns(message.message),
-                values["mode"],
-                values.get("model", ""),
-                values.get("reason", ""),
-                _frictions(values, "."),
-            )
-            if not changes or _force(changes[-1]) != _force(change):
-                changes.append(change)
+    for stamp, _, values in _statuses(messages):
+        if "mode" not in values:
+            continue
+        model, reason = values.get("model", ""), values.get("reason", "")
+        change = ModeChange(stamp, values["mode"], model, reason, _frictions(values, "."))
+        if not changes or _force(changes[-1]) != _force(change):
+            changes.append(change)
     return tuple(changes)
 
 
 def fits(messages: Iterable[BagMessage]) -> tuple[Fit, ...]:
     """Return the fits that ``/diagnostics`` tells, by the end of their window."""
     found: dict[int, Fit] = {}
-    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
-        for status in message.message.status:
-            values = {item.key: item.value for item in status.values}
-            if "identification" not in values or not values.get("window_end", "").isdecimal():
-                continue
-            try:
-                identification = json.loads(values["identification"])
-            except json.JSONDecodeError:
-                continue
-            if isinstance(identification, dict):
-                stamp = int(values["window_end"])
-                found[stamp] = Fit(stamp, identification, _frictions(values, ".trusted_"))
-    return tuple(found[stamp] for stamp in sorted(found))
+    for end, values, identification in _documents(messages, "identification"):
+        found[end] = Fit(end, identification, _frictions(values, ".trusted_"))
+    return tuple(found[end] for end in sorted(found))
+
+
+def gap_log(messages: Iterable[BagMessage]) -> GapLog:
+    """Return what the diagnostics among ``messages`` tell of the monitor, in order of time."""
+    told = list(messages)
+    looks, findings = (
+        dict(sorted((end, document) for end, _, document in _documents(told, kind)))
+        for kind in ("look", "finding")
+    )
+    return GapLog(looks, findings)
+
+
+def answer_times(messages: Iterable[BagMessage]) -> dict[str, float]:
+    """Return p50, p99, p999 and max of the times from PV to OP, ms; empty in lockstep.
+
+    The figures are of the whole run, so the last ones told count.
+    """
+    found: dict[str, float] = {}
+    for _, _, told in _statuses(messages):
+        values = {name: _number(told.get(f"pv_to_op_ms_{name}", "")) for name in FIGURES}
+        if all(map(math.isfinite, values.values())):
+            found = values
+    return found
 
 
 def stem_estimate(messages: Iterable[BagMessage], record: Record, start: int) -> FloatArray | None:
@@ -198,10 +228,8 @@ def _frictions(values: Mapping[str, str], mark: str) -> dict[str, float]:
         valve, dot, name = key.rpartition(mark)
         if not (valve and dot and name):
             continue
-        try:
+        with contextlib.suppress(ValueError):
             found[f"{valve}.{name}"] = float(value)
-        except ValueError:
-            continue
     return found
 
 
@@ -237,13 +265,10 @@ def published_counts(messages: Iterable[BagMessage]) -> dict[str, int]:
     colon in the status name, the last count holds; several nodes on a topic add up.
     """
     last: dict[tuple[str, str], int] = {}
-    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
-        for status in message.message.status:
-            node = node_of(status)
-            for item in status.values:
-                key = str(item.key)
-                if key.startswith(("published:", "published ")) and item.value.isdecimal():
-                    last[node, key[len("published:") :].strip()] = int(item.value)
+    for _, node, values in _statuses(messages):
+        for key, value in values.items():
+            if key.startswith(("published:", "published ")) and value.isdecimal():
+                last[node, key[len("published:") :].strip()] = int(value)
     totals: Counter[str] = Counter()
     for (_, topic), count in last.items():
         totals[topic] += count
@@ -262,6 +287,36 @@ def tells_of_run(topic: BagTopic) -> bool:
         (_STRING, "loop_model"),
         (_STRING, "config"),
     }
+
+
+def _statuses(messages: Iterable[BagMessage]) -> Iterator[_Status]:
+    """Yield what ``/diagnostics`` tells."""
+    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
+        for status in message.message.status:
+            values = {str(item.key): str(item.value) for item in status.values}
+            yield _Status(stamp_ns(message.message), node_of(status), values)
+
+
+def _documents(
+    messages: Iterable[BagMessage], key: str
+) -> Iterator[tuple[int, Mapping[str, str], Mapping[str, Any]]]:
+    """Yield the end of a window, all keys of its status, and the JSON that stands under one."""
+    for _, _, values in _statuses(messages):
+        end = values.get("window_end", "")
+        try:
+            document = json.loads(values.get(key, ""))
+        except json.JSONDecodeError:
+            continue
+        if end.isdecimal() and isinstance(document, dict):
+            yield int(end), values, document
+
+
+def _number(text: str) -> float:
+    """Return the number in a text; NaN for none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def _of(messages: Iterable[BagMessage], type_name: str, name: str) -> Iterable[BagMessage]:

@@ -12,16 +12,18 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records.bag.messages import BagMessage, MessageDecoder, read_raw
 from stiction_ros.records.parts import joined, span
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.answer_times import answer_times
 from stiction_ros.records.run.bag_reader import bag_source
 from stiction_ros.records.run.events import (
     Estimate,
     Fit,
+    GapLog,
     ModeChange,
     Text,
+    answer_times,
     clock,
     estimates,
     fits,
+    gap_log,
     mode_changes,
     mode_texts,
     of_loop,
@@ -30,20 +32,8 @@ from stiction_ros.records.run.events import (
     tells_of_run,
     texts,
 )
-from stiction_ros.records.run.gap_log import GapLog, gap_log
 from stiction_ros.records.run.loop_runs import LoopRun, loop_runs
 from stiction_ros.records.run.loop_signals import LoopSignals, is_signal
-
-__all__ = [
-    "Estimate",
-    "Fit",
-    "ModeChange",
-    "RunLog",
-    "Text",
-    "fits",
-    "mode_changes",
-    "read_run",
-]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,14 +117,8 @@ class RunLog:
 def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
     """Read everything that a report needs from a bag, in one pass.
 
-    Of several runs the longest is told, with a note on the others.
-
-    Args:
-        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
-        namespace: of the loop's topics; needed when the bag holds several loops.
-
-    Raises:
-        InputError: as :func:`stiction_ros.records.run.bag_reader.read_bag_parts`.
+    Of several runs the longest is told, with a note on the others. Arguments and errors are those
+    of :func:`stiction_ros.records.run.bag_reader.read_bag_parts`.
     """
     notes: list[str] = []
     recorded: Counter[str] = Counter()

@@ -12,7 +12,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.bag.message_definitions import definition
 from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.bag_reader import JOINT_STATE
+from stiction_ros.records.run.loop_signals import JOINT_STATE
 from stiction_ros.records.storage.bag_metadata import Qos
 
 SECOND = 10**9

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,8 +16,6 @@ VERSION = 9
 
 INFINITE_NS = 2**63 - 1
 """Nanoseconds by which ROS writes an infinite duration."""
-
-_FASTEST: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)  # PyYAML may lack its C part
 
 _WORDS = {
     "history": ("system_default", "keep_last", "keep_all", "unknown"),
@@ -151,7 +148,6 @@ def bag_information(
     topics: Sequence[BagTopic],
     *,
     custom: Mapping[str, str] | None = None,
-    ros_distro: str = "jazzy",
 ) -> dict[str, Any]:
     """Return the mapping ``rosbag2_bagfile_information`` of a bag.
 
@@ -159,7 +155,6 @@ def bag_information(
         files: its storage files in order, one at least.
         topics: each once.
         custom: short texts about the run, such as its seed.
-        ros_distro: of the recorder.
     """
     whole = joined(files)
     return {
@@ -172,7 +167,7 @@ def bag_information(
                     "name": topic.name,
                     "type": topic.type,
                     "serialization_format": topic.encoding,
-                    "offered_qos_profiles": _profiles(topic.qos_yaml),
+                    "offered_qos_profiles": yaml.safe_load(topic.qos_yaml) or [],
                     "type_description_hash": topic.type_hash,
                 },
                 "message_count": whole.counts.get(topic.name, 0),
@@ -182,9 +177,9 @@ def bag_information(
         "compression_format": "",
         "compression_mode": "",
         "relative_file_paths": [file.name for file in files],
-        "files": [{"path": file.name, **_reordered(file.span)} for file in files],
+        "files": [{"path": file.name, **file.span} for file in files],
         "custom_data": dict(custom) if custom else None,
-        "ros_distro": ros_distro,
+        "ros_distro": "jazzy",
     }
 
 
@@ -198,21 +193,5 @@ def metadata_yaml(information: Mapping[str, Any]) -> str:
     return _yaml({"rosbag2_bagfile_information": information})
 
 
-def _reordered(span: dict[str, Any]) -> dict[str, Any]:
-    return {key: span[key] for key in ("starting_time", "duration", "message_count")}
-
-
-@functools.lru_cache(maxsize=64)
-def _profiles(text: str) -> Any:
-    return yaml.safe_load(text) or []
-
-
-class _Dumper(_FASTEST):  # type: ignore[misc]
-    """Writes equal mappings out again instead of by alias."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
 def _yaml(value: Any) -> str:
-    return str(yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True))
+    return yaml.safe_dump(value, sort_keys=False, allow_unicode=True)

@@ -9,7 +9,7 @@ from typing import Protocol
 from mcap.data_stream import RecordBuilder
 from mcap.records import Header
 
-from stiction_ros.records.storage.mcap_format import MAGIC
+from stiction_ros.records.storage.mcap_scan import MAGIC
 
 _BLOCK = 1 << 20
 

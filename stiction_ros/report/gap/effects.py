@@ -12,7 +12,7 @@ from stiction_ros.discrepancy.gap.measure import levelled
 from stiction_ros.pages.frame import text
 from stiction_ros.pages.plot import KINDS, Curve, over_time
 from stiction_ros.report.gap.words import called, figures_with_units, place_of, word_of
-from stiction_ros.report.page import card, number
+from stiction_ros.report.page import card
 
 WINDOW = 400  # samples that are drawn, where an effect moves PV most
 
@@ -100,21 +100,4 @@ def _apart(signals: list[np.ndarray[tuple[int], np.dtype[np.float64]]]) -> bool:
 
 def change_lines(found: Discrepancy) -> list[str]:
     """Return what of the process was changed, one line each."""
-    lines = []
-    for change in found.process_changes:
-        low, high = change.interval
-        if change.what == "delay":
-            lines.append(
-                f"{change.output}: dead time {number(change.value)} s longer than in the model "
-                f"(95 % between {number(low)} and {number(high)})"
-            )
-            continue
-        what = "gain"
-        if change.model is not None:
-            kind = "lead" if change.what == "lead" else "time constant"
-            what = f"{kind} of {number(change.model)} s"
-        lines.append(
-            f"{change.output}: {what} {number(change.value)} times that of the model "
-            f"(95 % between {number(low)} and {number(high)})"
-        )
-    return lines
+    return [f"{change.output}: {change.sentence}" for change in found.process_changes]

@@ -79,6 +79,8 @@ def gap_page(found: Discrepancy) -> str:
 
 def _headline(found: Discrepancy) -> str:
     names = [_called(effect) for effect in found.effects]
+    if not names and not found.alternatives and found.process_changes:
+        return f"The process is another than the model: {'; '.join(change_lines(found))}"
     if not names:
         names = [" or ".join(called(*name) for name in found.alternatives)]
     return _HEADLINES[found.verdict].format(what=", and ".join(names))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT
-from stiction_ros.records.run.log import ModeChange
+from stiction_ros.records.run.events import ModeChange
 from stiction_ros.report.page import (
     Cell,
     count,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from stiction_ros.online.session import LiveRun
-from stiction_ros.records.run.log import Estimate, Fit, ModeChange, RunLog
+from stiction_ros.records.run.events import Estimate, Fit, ModeChange
+from stiction_ros.records.run.log import RunLog
 
 
 def log_of(live: LiveRun) -> RunLog:
@@ -16,11 +17,8 @@ def log_of(live: LiveRun) -> RunLog:
             update.identification.to_dict(),
             {
                 f"{valve}.{key}": value
-                for valve, friction in update.trusted.items()
-                for key, value in (
-                    ("f_s", friction.static_friction),
-                    ("f_d", friction.dynamic_friction),
-                )
+                for valve, f in update.trusted.items()
+                for key, value in (("f_s", f.static_friction), ("f_d", f.dynamic_friction))
             },
         )
         for update in live.fits

@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.records.quality import Quality, QualityArray
-from stiction_ros.records.record import Record
-from stiction_ros.records.segment import Gap
+from stiction_ros.records.record import Gap, Record
 from stiction_studies.field.circumstances import UNITS, Circumstances, Friction, Hole, Keeping, Unit
 from stiction_studies.field.drawing import Made
 from stiction_studies.field.kernels import FlagArray, FloatArray

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.effects import Backlash, ExtraDelay, HeStiction, Lag
@@ -19,7 +19,6 @@ QUIET = MonitorRule(monitor=True, monitor_growth=10.0)
     onset=st.integers(1, 40),
     inner=st.sampled_from([Backlash(3.0), HeStiction(2.0, 1.0), Lag(5.0), ExtraDelay(3.0)]),
 )
-@settings(max_examples=30, deadline=None)
 def test_nothing_acts_before_the_onset_and_the_effect_from_rest_behind_it(
     onset: int, inner: Backlash
 ) -> None:
@@ -57,6 +56,7 @@ def test_a_healthy_loop_without_alarm_is_quiet() -> None:
     assert found.looks == (19, 0)
 
 
+@pytest.mark.trial
 def test_an_effect_without_alarm_is_missed() -> None:
     found = watch(late_loop(110), QUIET)
     assert (found.score, found.delay, found.findings) == (Score.MISSED, None, ())

@@ -99,7 +99,7 @@ def test_the_paper_s_settings_can_be_given(capsys: pytest.CaptureFixture[str]) -
         ["example2", "--noise", "equation"],
         ["2", "--family", "sine"],
         ["1", "--seed", "-1"],
-        ["1", "--nb", "2"],
+        pytest.param(["1", "--nb", "2"], marks=pytest.mark.trial),
         ["healthy", "--seeds", "1:2", "--out", "somewhere"],
         ["healthy", "--samples", "500"],
         ["1", "--samples", "40"],

@@ -68,6 +68,7 @@ def test_only_the_unaware_loop_cycles(
     assert late[0] < 0.7 * late[1]
 
 
+@pytest.mark.trial
 def test_the_same_seed_gives_the_same_run(
     nominal: tuple[ControlOutcome, ControlOutcome, ControlOutcome], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -76,6 +77,7 @@ def test_the_same_seed_gives_the_same_run(
     assert np.array_equal(again.error, nominal[0].error[:320])
 
 
+@pytest.mark.trial
 def test_the_slip_check_holds_a_loop_whose_static_friction_is_half_as_large_again() -> None:
     case = CASES["true_50_more"]
     with_check, without = run_case(case, 41), run_case(case, 41, {"slip_check": False})

@@ -13,7 +13,10 @@ from stiction_studies.examples import FAMILIES, Example, healthy_loop
 SEEDS = range(1, 8)
 
 
-@pytest.fixture(scope="module", params=FAMILIES)
+@pytest.fixture(
+    scope="module",
+    params=[FAMILIES[0], *(pytest.param(f, marks=pytest.mark.trial) for f in FAMILIES[1:])],
+)
 def loops(request: pytest.FixtureRequest) -> list[Example]:
     return [healthy_loop(seed, request.param) for seed in SEEDS]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.effects.behaviour import FloatArray
@@ -44,7 +44,6 @@ def plain(entry: Record, orders: tuple[int, int], delay: int) -> FloatArray:
     return np.asarray(y[first:] - np.array(rows) @ theta)
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     seed=st.integers(0, 10_000),
     orders=st.tuples(st.integers(1, 3), st.integers(1, 3)),
@@ -57,7 +56,6 @@ def test_it_is_the_plain_regression(seed: int, orders: tuple[int, int], delay: i
     assert found == pytest.approx(float(residual @ residual), rel=1e-9)
 
 
-@settings(max_examples=25, deadline=None)
 @given(shift=st.floats(-1e3, 1e3), scale=st.floats(0.1, 10.0))
 def test_an_offset_costs_nothing_and_a_scale_its_square(shift: float, scale: float) -> None:
     entry = record(1, 0.3)

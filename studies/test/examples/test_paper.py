@@ -11,7 +11,9 @@ from stiction_ros.processes import NoiseEntry, StirredTank
 from stiction_studies.examples import NOISES, PLANTS, Example, example1, example2
 
 
-@pytest.fixture(scope="module", params=NOISES)
+@pytest.fixture(
+    scope="module", params=[NOISES[0], pytest.param(NOISES[1], marks=pytest.mark.trial)]
+)
 def first(request: pytest.FixtureRequest) -> Example:
     return example1(3, request.param)
 
@@ -34,6 +36,7 @@ def test_example1_has_the_printed_length_and_orders(first: Example) -> None:
     assert first.delay("PV1", "V1") == 5
 
 
+@pytest.mark.trial
 def test_a_longer_example1_goes_on_with_the_same_set_points(first: Example) -> None:
     longer = example1(3, first.variant, samples=2600).record
     assert first.record.sp is not None
@@ -77,10 +80,6 @@ def test_example2_has_the_schedule(second: Example) -> None:
 def test_a_shorter_example2_is_the_beginning_of_the_longer(second: Example) -> None:
     shorter = example2(3, second.variant, samples=620).record
     assert np.array_equal(shorter.pv, second.record.pv[:620])
-
-
-def test_example2_is_the_same_for_the_same_seed(second: Example) -> None:
-    assert np.array_equal(example2(3, second.variant).record.pv, second.record.pv)
 
 
 def test_example2_has_one_sticky_valve_that_cycles(second: Example) -> None:

@@ -67,6 +67,7 @@ def test_no_loop_is_lost_and_those_read_are_the_recorded_ones(plant: Path) -> No
     assert exact >= LOOPS // 2
 
 
+@pytest.mark.trial
 def test_a_seed_makes_the_same_plant_again(plant: Path, tmp_path: Path) -> None:
     arguments = ["--loops", "5", "--seed", str(SEED), "--jobs", "1"]
     assert main(["experiment", "plant", *arguments, "--out", str(tmp_path / "again")]) == 0
@@ -74,8 +75,9 @@ def test_a_seed_makes_the_same_plant_again(plant: Path, tmp_path: Path) -> None:
     assert (tmp_path / "again" / "single" / first.name).read_bytes() == first.read_bytes()
 
 
-def test_a_folder_in_use_is_refused(plant: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["--loops", "1", "--jobs", "1", "--out", str(plant)]
+def test_a_folder_in_use_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.csv").write_text("")
+    arguments = ["--loops", "1", "--jobs", "1", "--out", str(tmp_path)]
     assert main(["experiment", "plant", *arguments]) == 2
     assert "is not empty" in capsys.readouterr().err
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_studies.field.historian import averaged, excepted, rounded, sampled, swinging_door
@@ -12,7 +12,6 @@ from stiction_studies.field.historian import averaged, excepted, rounded, sample
 signals = st.lists(st.floats(-100.0, 100.0), min_size=3, max_size=80).map(np.array)
 
 
-@settings(max_examples=60, deadline=None)
 @given(values=signals, deadband=st.floats(0.01, 20.0), longest=st.integers(2, 30))
 def test_reports_by_exception_stay_within_the_deadband(
     values: np.ndarray, deadband: float, longest: int
@@ -23,7 +22,6 @@ def test_reports_by_exception_stay_within_the_deadband(
     assert (kept[changes] == values[changes]).all()
 
 
-@settings(max_examples=60, deadline=None)
 @given(values=signals, deviation=st.floats(0.01, 20.0), longest=st.integers(2, 30))
 def test_a_swinging_door_stays_near_the_signal(
     values: np.ndarray, deviation: float, longest: int

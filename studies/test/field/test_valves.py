@@ -11,7 +11,7 @@ from stiction_ros.errors import InputError
 from stiction_studies.field.valves import Law, Stem, Valve, slow_triangle
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(static=st.floats(0.5, 8.0), share=st.floats(0.1, 0.9))
 @example(static=1.0, share=0.126953125)
 def test_the_triangle_shows_the_parameters_of_he_s_law(static: float, share: float) -> None:
@@ -21,7 +21,7 @@ def test_the_triangle_shows_the_parameters_of_he_s_law(static: float, share: flo
     assert shown.jump == pytest.approx((1.0 - share) * static, rel=0.02, abs=0.02 * static)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(half=st.floats(0.05, 5.0))
 def test_the_triangle_shows_the_band_of_a_backlash_and_no_jump(half: float) -> None:
     shown = slow_triangle(Valve(Law.BACKLASH, half, half))

@@ -60,6 +60,7 @@ def test_the_command_counts_all_methods() -> None:
     assert choices.COUNTED == METHODS
 
 
+@pytest.mark.trial
 def test_settings_of_the_examples_are_the_paper_s() -> None:
     one, two = printed_example(1), printed_example(2)
     assert (one.starts * one.choices, two.starts * two.choices) == (77, 5)

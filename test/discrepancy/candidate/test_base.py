@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 from gap_loops import loop, record
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
@@ -23,7 +23,6 @@ CANDIDATE = ValveCandidate.at(RUN, 0, Backlash, AXES)
 
 
 @given(st.floats(0.1, 20.0), st.floats(-1.0, 1.0))
-@settings(max_examples=50, deadline=None)
 def test_coordinates_and_values_undo_each_other(first: float, second: float) -> None:
     point = np.array([first, second])
     there = CANDIDATE.coordinates(point)
@@ -31,7 +30,6 @@ def test_coordinates_and_values_undo_each_other(first: float, second: float) -> 
 
 
 @given(st.integers(0, 1000), st.integers(1, 6))
-@settings(max_examples=50, deadline=None)
 def test_points_apart_are_no_neighbours_and_the_best_is_first(seed: int, most: int) -> None:
     grid = CANDIDATE.grid()
     loss = np.random.default_rng(seed).random(len(grid))

@@ -28,7 +28,7 @@ def test_a_fine_lattice_is_the_density() -> None:
 
 
 @given(st.floats(0.0, 1.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_nothing_is_gained_inside_a_step(share: float) -> None:
     inside = 0.45 * np.sin(np.arange(COUNT))  # within half a quantum
     assert minus_two_log(share * inside, 1.0) == pytest.approx(minus_two_log(inside, 1.0), abs=60.0)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
@@ -37,7 +37,6 @@ def sampled(zeros: list[float], poles: list[float], gain: float) -> tuple[FloatA
 
 
 @given(st.floats(0.1, 3.0), LAGS, st.floats(0.05, 0.95), st.floats(-2.0, 2.0))
-@settings(max_examples=30, deadline=None)
 def test_a_dead_time_is_exact_between_samples(
     gain: float, time: float, fraction: float, more: float
 ) -> None:

@@ -41,7 +41,7 @@ def test_friction_fitted_to_a_square_load_is_behind_a_line() -> None:
     assert found.outputs[0].rivalry > 1.0
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     op=st.floats(0.1, 20.0),
     pv=st.floats(0.1, 20.0),

@@ -180,7 +180,7 @@ def test_noise_is_no_oscillation(seed: int) -> None:
     assert found.kind is CauseKind.NONE
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(
     op=st.floats(0.05, 20.0),
     pv=st.floats(0.05, 20.0),

@@ -52,7 +52,6 @@ def _stem(random: np.random.Generator, rows: int, stays: float) -> FloatArray:
 NOISE = np.array([1.0, -0.6, 0.2])
 
 
-@settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10**6), EDGES, st.integers(2, 20), st.sampled_from([0.0, 0.5, 0.9, 1.0]))
 def test_products_of_lags_are_those_of_the_rows(
     seed: int, edges: IntArray, first: int, stays: float
@@ -82,7 +81,6 @@ def test_products_of_lags_are_those_of_the_rows(
     assert grouped(seen, edges) == pytest.approx(rows @ other, abs=1e-9)
 
 
-@settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10**6), EDGES, st.integers(2, 20), st.integers(0, 3))
 def test_products_of_lags_with_lines_are_those_of_the_rows(
     seed: int, edges: IntArray, first: int, harmonics: int
@@ -99,7 +97,6 @@ def test_products_of_lags_with_lines_are_those_of_the_rows(
     assert found == pytest.approx(lags @ rows.T, abs=1e-8)
 
 
-@settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10**6), st.integers(1, 60), st.floats(0.0, 1.0))
 def test_a_stem_is_its_beginning_and_its_moves(seed: int, rows: int, stays: float) -> None:
     stem = _stem(np.random.default_rng(seed), rows, stays)
@@ -121,7 +118,6 @@ def test_rows_are_means_that_come_later(size: int, rate: int, skipped: int) -> N
     assert in_rows(stems, rate, skipped, 2.0) == pytest.approx(wanted, abs=1e-12)
 
 
-@settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10**6), st.integers(1, 12), st.integers(1, 30))
 def test_a_response_answers_to_what_was_before_the_record(seed: int, taps: int, rows: int) -> None:
     random = np.random.default_rng(seed)
@@ -135,7 +131,6 @@ def test_a_signal_that_was_constant_before_the_record_has_no_transient() -> None
     assert whitened(noise, np.full(9, 2.0), 2.0) == pytest.approx(np.full(9, 0.6))
 
 
-@settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10**6), st.integers(1, 9))
 def test_factor_solves_and_tells_the_determinant(seed: int, size: int) -> None:
     random = np.random.default_rng(seed)
@@ -148,7 +143,7 @@ def test_factor_solves_and_tells_the_determinant(seed: int, size: int) -> None:
     assert explained == pytest.approx(right @ np.linalg.solve(matrix, right), rel=1e-8)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.integers(0, 10**6), EDGES, st.integers(0, 5))
 def test_evidence_is_the_marginal_likelihood_of_a_normal_record(
     seed: int, edges: IntArray, decay: int

@@ -61,7 +61,7 @@ def test_an_ideal_valve_gives_no_evidence_of_friction() -> None:
     assert found.ideal.loss - found.best.loss < 15.0
 
 
-@settings(deadline=None, max_examples=4)
+@settings(max_examples=4)
 @given(
     st.sampled_from([0.05, 20.0, -3.0]),
     st.sampled_from([0.0, 50.0]),

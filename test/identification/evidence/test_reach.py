@@ -105,7 +105,7 @@ def test_a_reach_sums_the_taps_up_to_three_reset_times(
     assert reach.unit == pytest.approx(seen / (4.0 * 0.5))
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 10**6), st.sampled_from(range(len(REACHES))), st.floats(0.1, 5.0))
 def test_a_held_response_has_the_likelihood_of_the_record_given_its_sum(
     seed: int, reach: int, unit: float
@@ -203,7 +203,6 @@ def first_order(gain: float, pole: float, taps: int = 200) -> FloatArray:
 
 
 @pytest.mark.trial
-@settings(deadline=None, max_examples=50)
 @given(st.floats(0.05, 12.0), st.floats(2.0, 200.0), st.floats(0.3, 0.97), st.sampled_from([1, 2]))
 def test_a_controller_holds_a_process_when_the_loop_of_both_comes_to_rest(
     gain: float, reset: float, pole: float, rate: int

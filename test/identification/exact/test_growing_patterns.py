@@ -6,7 +6,7 @@ import itertools
 import numpy as np
 import pytest
 import simulated_loops as loops
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.effects import FloatArray, HeStiction
@@ -63,7 +63,6 @@ def branch_at(loop: tuple[Data, Model, Orders], count: int, point: FloatArray) -
     return Branch(search, begin, scan)
 
 
-@settings(max_examples=25, deadline=None)
 @given(jump=st.floats(0.3, 6.0), more=st.floats(0.5, 6.0), longer=st.integers(210, 400))
 def test_cells_of_a_longer_window_fill_the_cell_they_come_from(
     loop: tuple[Data, Model, Orders], jump: float, more: float, longer: int
@@ -78,7 +77,6 @@ def test_cells_of_a_longer_window_fill_the_cell_they_come_from(
     assert area(inside) == pytest.approx(area(whole), rel=1e-9)
 
 
-@settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 10_000), static=st.floats(0.2, 5.0), share=st.floats(-0.9, 0.9))
 def test_a_valve_slips_first_where_op_goes_beyond_all_it_was(
     seed: int, static: float, share: float

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import simulated_loops as loops
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from samples import stems
 
@@ -57,7 +57,6 @@ def test_enumerated_cells_fill_the_rectangle(near_truth: tuple[Data, Model, Orde
     assert search.enumerate(search.begin, rectangle[None, :], 2) is None
 
 
-@settings(max_examples=40, deadline=None)
 @given(jump=st.floats(0.5, 6.0), more=st.floats(0.2, 6.0), slip=st.integers(0, 2))
 def test_a_friction_and_a_start_have_the_pattern_of_their_cell(
     near_truth: tuple[Data, Model, Orders], jump: float, more: float, slip: int
@@ -73,7 +72,6 @@ def test_a_friction_and_a_start_have_the_pattern_of_their_cell(
     assert (cells_at(search.u, again, points_of(friction[None, :])).bounds == scan.bounds).all()
 
 
-@settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 10_000), static=st.floats(0.2, 5.0), share=st.floats(-0.99, 0.99))
 def test_levels_of_a_first_slip_are_those_from_which_it_comes(
     seed: int, static: float, share: float
@@ -114,7 +112,6 @@ def test_cells_that_are_known_are_not_listed_again(near_truth: tuple[Data, Model
     assert (other.cells.bounds == apart.cells.bounds).all()
 
 
-@settings(max_examples=30, deadline=None)
 @given(jump=st.floats(2.951, 3.049), reverse=st.floats(6.951, 7.049))
 def test_no_point_of_the_rectangle_beats_its_cells(
     near_truth: tuple[Data, Model, Orders], jump: float, reverse: float

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 
 import linear_systems as systems
@@ -75,6 +76,12 @@ def open_loop(order: int, noise: float) -> tuple[Record, systems.System]:
     return systems.experiment(system, random, 1500, noise), system
 
 
+@functools.cache
+def fitted(kind: LinearKind) -> LinearIdentification:
+    """What is found of the second-order system."""
+    return fit_linear(open_loop(2, 0.05)[0], LinearOptions(kind=kind))
+
+
 def simulated(found: LinearIdentification, record: Record) -> np.ndarray:
     """Return the free run of the process from rest, shape (N, p)."""
     process = found.process
@@ -91,7 +98,7 @@ def simulated(found: LinearIdentification, record: Record) -> np.ndarray:
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_gives_gains_fits_and_a_process(kind: LinearKind) -> None:
     record, system = open_loop(2, 0.05)
-    found = fit_linear(record, LinearOptions(kind=kind))
+    found = fitted(kind)
     truth = system.c @ np.linalg.solve(np.eye(2) - system.a, system.b)
     assert found.status is LinearStatus.OK
     assert found.gain == pytest.approx(truth, abs=0.06 * np.abs(truth).max())
@@ -131,11 +138,10 @@ def test_what_the_process_cannot_hold_is_in_the_provenance() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_json_is_json_and_holds_every_rival(kind: LinearKind) -> None:
-    record, _ = open_loop(2, 0.05)
-    found = fit_linear(record, LinearOptions(kind=kind))
+    found = fitted(kind)
     document = json.loads(json.dumps(found.to_dict()))
     assert document["model"]["kind"] == kind.value
-    assert [entry["name"] for entry in document["outputs"]] == list(record.outputs)
+    assert [entry["name"] for entry in document["outputs"]] == list(open_loop(2, 0.05)[0].outputs)
     for entry in document["outputs"]:
         assert {"delay", "gain", "noise_std", "fit_one_step", "fit_free_run"} <= entry.keys()
     space = kind is LinearKind.STATE_SPACE

@@ -7,7 +7,7 @@ import pathlib
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.identification.problem.input_checks import Evidence, SwapRule, swapped_columns
@@ -17,9 +17,9 @@ from stiction_studies.examples import FAMILIES, NOISES, PLANTS, example1, exampl
 
 DATA = pathlib.Path(__file__).resolve().parents[4] / "shared" / "data"
 CASES = [
-    *((example1, noise) for noise in NOISES),
-    *((example2, plant) for plant in PLANTS),
-    *((healthy_loop, family) for family in FAMILIES),
+    pytest.param(make, variant, marks=pytest.mark.trial if later else ())
+    for make, variants in ((example1, NOISES), (example2, PLANTS), (healthy_loop, FAMILIES))
+    for later, variant in enumerate(variants)
 ]
 
 
@@ -67,7 +67,6 @@ def test_simulated_loops(make: object, variant: str, seed: int) -> None:
     assert found.rule is SwapRule.CONTROLLER
 
 
-@settings(max_examples=30, deadline=None)
 @given(
     seed=st.integers(0, 1000),
     gain=st.floats(0.05, 3.0),

@@ -23,7 +23,6 @@ def driven(seed: int, delay: int, samples: int = 600) -> tuple[FloatArray, Float
     return stem, lfilter(np.r_[np.zeros(delay + 1), 0.3], A, stem)
 
 
-@settings(deadline=None)
 @given(roots=st.lists(st.floats(-1.3, 1.3), min_size=1, max_size=5), radius=st.floats(0.5, 1.0))
 def test_stability_is_that_of_the_roots(roots: list[float], radius: float) -> None:
     largest = max(abs(root) for root in roots)
@@ -38,7 +37,7 @@ def test_stability_of_complex_roots() -> None:
     assert not is_stable(polynomial, 0.89)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=seeds, weight=st.floats(0.0, 1.0))
 def test_point_is_the_least_squares_solution_over_everything_linear(
     seed: int, weight: float
@@ -65,7 +64,7 @@ def test_point_is_the_least_squares_solution_over_everything_linear(
     assert point.total == pytest.approx(residual @ residual, rel=1e-9)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=seeds, weight=st.floats(0.0, 1.0))
 def test_gradient_is_the_slope_of_the_criterion(seed: int, weight: float) -> None:
     stem, y = driven(seed, 1, 200)
@@ -85,7 +84,6 @@ def test_gradient_is_the_slope_of_the_criterion(seed: int, weight: float) -> Non
     assert (ends[0] - ends[1]) / 2e-6 == pytest.approx(2.0 * gradient @ way, rel=1e-4, abs=1e-3)
 
 
-@settings(max_examples=30, deadline=None)
 @given(sizes=st.lists(st.floats(0.1, 3.0), min_size=1, max_size=3))
 def test_roots_are_pulled_inside(sizes: list[float]) -> None:
     rays = np.exp(1j * np.array([0.4, 1.4, 2.6])[: len(sizes)])  # apart from each other
@@ -94,7 +92,7 @@ def test_roots_are_pulled_inside(sizes: list[float]) -> None:
     assert stabilised(polynomial, 0.9) == pytest.approx(expected, abs=1e-9)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=seeds, order=st.integers(0, 6))
 def test_products_of_lags(seed: int, order: int) -> None:
     w = np.random.default_rng(seed).standard_normal(50)
@@ -111,7 +109,7 @@ def test_signals_through_any_order(order: int, signals: int) -> None:
     assert out == pytest.approx(lfilter([1.0], a, x), rel=1e-9)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=seeds, delay=st.integers(0, 4))
 def test_noise_on_the_measurement_leaves_the_process_unbiased(seed: int, delay: int) -> None:
     stem, y = driven(seed, delay, 2000)
@@ -122,7 +120,7 @@ def test_noise_on_the_measurement_leaves_the_process_unbiased(seed: int, delay: 
     assert np.sqrt(fit.energy / fit.count) == pytest.approx(0.1, rel=0.1)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=seeds)
 def test_coloured_noise_is_whitened(seed: int) -> None:
     stem, y = driven(seed, 1, 2000)

@@ -12,7 +12,6 @@ from stiction_ros.identification.problem.scan import OutputScan
 from stiction_ros.identification.switching.step_signals import StepSignals
 
 
-@settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 1000), na=st.integers(1, 3), nb=st.integers(1, 3))
 def test_one_step_criterion_is_the_least_squares_one(seed: int, na: int, nb: int) -> None:
     generator = np.random.default_rng(seed)
@@ -31,7 +30,7 @@ def test_one_step_criterion_is_the_least_squares_one(seed: int, na: int, nb: int
             assert energy[g, delay] == pytest.approx(rest @ rest, rel=1e-6)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 1000), nb=st.integers(1, 3), p=st.integers(0, 2))
 def test_pattern_energy_is_that_of_the_stem_it_stands_for(seed: int, nb: int, p: int) -> None:
     generator = np.random.default_rng(seed)

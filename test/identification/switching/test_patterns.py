@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from samples import bases, stems
 
@@ -25,7 +25,6 @@ def simulated(u: FloatArray, static: float, dynamic: float, level: float) -> Flo
     return HeStiction.simulate_grid(np.array([[static, dynamic]]), u, level)[:, 0]
 
 
-@settings(max_examples=60, deadline=None)
 @given(seed=seeds, static=st.floats(0.05, 5.0), share=st.floats(0.0, 1.0), level=st.floats(-3, 3))
 def test_pattern_gives_the_stem_of_the_law(
     seed: int, static: float, share: float, level: float
@@ -38,7 +37,6 @@ def test_pattern_gives_the_stem_of_the_law(
     assert np.abs(found.T - simulated(u, static, dynamic, level)).max() < 1e-9
 
 
-@settings(max_examples=60, deadline=None)
 @given(seed=seeds, jump=st.floats(0.1, 4.0), more=st.floats(0.1, 4.0), place=st.floats(0.01, 0.99))
 def test_friction_inside_a_cell_has_its_pattern_and_none_outside(
     seed: int, jump: float, more: float, place: float

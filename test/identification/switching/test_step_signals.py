@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from samples import dense
 
@@ -14,7 +14,6 @@ SIZES = st.integers(0, 3)
 GRID = np.array([[0.0, 0.0], [0.3, 0.1], [1.0, 1.0], [2.5, 0.5], [90.0, 1.0]])
 
 
-@settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 10_000), samples=st.integers(1, 130), start=st.floats(-3.0, 3.0))
 @pytest.mark.parametrize("law", [HeStiction, KanoStiction])
 def test_moves_give_the_stem_of_the_law(
@@ -28,7 +27,6 @@ def test_moves_give_the_stem_of_the_law(
 
 
 @given(seed=st.integers(0, 10_000), samples=st.integers(1, 40), size=st.integers(0, 3))
-@settings(deadline=None)
 def test_dense_signals_come_back(seed: int, samples: int, size: int) -> None:
     generator = np.random.default_rng(seed)
     one, two = generator.integers(0, 2, (2, samples, size)).astype(float)
@@ -40,7 +38,6 @@ def test_dense_signals_come_back(seed: int, samples: int, size: int) -> None:
 
 
 @given(seed=st.integers(0, 10_000), samples=st.integers(1, 40), sizes=st.tuples(*3 * [SIZES]))
-@settings(deadline=None)
 def test_joined_signals_are_those_of_the_parts(
     seed: int, samples: int, sizes: tuple[int, ...]
 ) -> None:
@@ -51,7 +48,6 @@ def test_joined_signals_are_those_of_the_parts(
 
 
 @given(seed=st.integers(0, 10_000), samples=st.integers(1, 40), chosen=st.lists(st.integers(0, 4)))
-@settings(deadline=None)
 def test_chosen_signals_are_those_asked_for(seed: int, samples: int, chosen: list[int]) -> None:
     every = np.random.default_rng(seed).integers(0, 2, (samples, 5)).astype(float)
     steps = StepSignals.of(every, 2.0 * every).chosen(np.array(chosen, dtype=np.int64))

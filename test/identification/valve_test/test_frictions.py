@@ -23,7 +23,7 @@ def test_the_prior_is_one_and_half_of_it_is_without_a_jump() -> None:
     assert cells.static.max() < LARGEST
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(st.integers(0, 2**32 - 1))
 def test_refining_keeps_the_prior_of_the_likely_cells(seed: int) -> None:
     cells = Frictions.all(STEPS)
@@ -35,7 +35,7 @@ def test_refining_keeps_the_prior_of_the_likely_cells(seed: int) -> None:
     assert finer.widths[:, 0].min() == 0.5 * cells.widths[:, 0].min()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1))
 def test_a_cell_moves_its_stem_by_hes_law(seed: int) -> None:
     cells = Frictions.all(STEPS)

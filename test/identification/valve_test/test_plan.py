@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from manual_tests import answer, path
 
@@ -44,7 +44,6 @@ def test_a_noisy_pv_takes_larger_pairs() -> None:
     assert ways(plan)[0] == pytest.approx(2.5)
 
 
-@settings(deadline=None)
 @given(st.floats(-2.0, 2.0), st.floats(0.0, 1.0), st.floats(0.1, 30.0), st.floats(0.1, 50.0))
 def test_the_first_round_passes_no_limit_and_comes_back(
     gain: float, noise: float, op_limit: float, room: float

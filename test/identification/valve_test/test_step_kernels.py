@@ -11,7 +11,7 @@ from stiction_ros.identification.valve_test.step_kernels import step_answers, wh
 ROWS = 40
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     st.integers(0, 2**32 - 1),
     st.floats(0.5, 50.0),

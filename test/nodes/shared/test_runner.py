@@ -57,13 +57,18 @@ def workers_of(number: int) -> list[int]:
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["--params-file", "none.yaml"],
         ["--params-file", "broken.yaml"],
-        ["--params-file", "listed.yaml"],
-        ["-r", "__ns:=/1 2"],
         ["-p", "seed:"],
-        ["-p", "seed:=x"],
         ["-p", "sed:=1"],
+        *(
+            pytest.param(given, marks=pytest.mark.trial)
+            for given in (
+                ["--params-file", "none.yaml"],
+                ["--params-file", "listed.yaml"],
+                ["-r", "__ns:=/1 2"],
+                ["-p", "seed:=x"],
+            )
+        ),
     ],
 )
 def test_unusable_input_is_said_without_a_traceback(arguments: list[str], tmp_path: Path) -> None:
@@ -106,7 +111,14 @@ def test_compilation_in_the_worker_is_not_waited_for(number: int, tmp_path: Path
     assert "Traceback" not in said
 
 
-@pytest.mark.parametrize("module", ["rclpy", "scipy", "llvmlite", LAST])
+@pytest.mark.parametrize(
+    "module",
+    [
+        "scipy",
+        LAST,
+        *(pytest.param(name, marks=pytest.mark.trial) for name in ("rclpy", "llvmlite")),
+    ],
+)
 def test_a_node_that_is_being_built_is_broken_off(module: str) -> None:
     told = {"PYTHONPROFILEIMPORTTIME": "1"}  # it says what it has imported
     process = start("controller", "-p", "model:=example1_process.loop.yaml", **told)

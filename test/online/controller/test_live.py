@@ -147,15 +147,6 @@ def test_an_offer_without_friction_goes_back_to_unaware() -> None:
     assert modes(run.live) == [(0, "embedding"), (10, "unaware")]
 
 
-def test_after_the_swap_the_limit_cycle_is_gone() -> None:
-    run = Run(LiveController(SETTINGS, PROCESS))
-    run.go(1000)
-    run.live.offer(KNOWN, 1000)
-    run.go(1400)
-    before, after = np.array(run.error[600:850]), np.array(run.error[2150:2400])
-    assert np.mean(after) < 0.5 * np.mean(before)
-
-
 def test_the_stem_is_known_after_the_swap() -> None:
     run = Run(LiveController(SETTINGS, PROCESS))
     run.go(600)
@@ -254,12 +245,14 @@ def test_a_controller_that_is_worse_is_rolled_back() -> None:
     assert run.live.frictions == (None,)
 
 
-def test_a_controller_that_does_well_stays() -> None:
+def test_a_controller_that_ends_the_limit_cycle_stays() -> None:
     run = Run(LiveController(watched(), PROCESS))
     run.go(1000)
     run.live.offer(KNOWN, 1000)
-    run.go(1500)
+    run.go(1400)
     assert modes(run.live) == [(0, "unaware"), (1000, "embedding")]
+    before, after = np.array(run.error[600:850]), np.array(run.error[2150:2400])
+    assert np.mean(after) < 0.5 * np.mean(before)
 
 
 OTHERS = 20.0  # %: by which another one's OP is off, so that the loop fares worse under it
@@ -270,14 +263,13 @@ OTHERS = 20.0  # %: by which another one's OP is off, so that the loop fares wor
     [
         # Who has the valve (o: we, x: another one, l: we, but limited) for so many samples before
         # the swap and after it, what is swapped in, and whether it is rolled back.
-        ("o350", "o500", "WORSE", True),
         ("o350", "o500", "KNOWN", False),
-        ("o350", "x500", "KNOWN", False),  # their errors are not ours
+        pytest.param("o350", "x500", "KNOWN", False, marks=pytest.mark.trial),  # their errors
         ("o350", "x500", "WORSE", False),  # nothing is seen of it
         ("o350", "x200 o700", "WORSE", True),  # seen once it has the valve, by what was ours
-        ("o350", "x200 o700", "KNOWN", False),
+        pytest.param("o350", "x200 o700", "KNOWN", False, marks=pytest.mark.trial),
         ("x350", "o700", "WORSE", False),  # there is nothing of ours to hold it against
-        ("x350 o350", "o500", "WORSE", True),
+        pytest.param("x350 o350", "o500", "WORSE", True, marks=pytest.mark.trial),
         ("o350", "l700", "WORSE", True),  # an OP that is limited is ours all the same
     ],
 )

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.control.jump_form import jump_form
@@ -195,7 +195,6 @@ def test_a_wide_interval_is_offered_from_below_and_narrowed_by_what_follows() ->
     assert found.offered_interval == found.static_interval
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.floats(-2.0, 2.0), st.floats(-0.3, 0.3), st.integers(0, 5))
 def test_a_share_is_what_was_put_in_whatever_the_gain(share: float, gain: float, seed: int) -> None:
     seen = evidence(kicks(5.5, 9.0, seed), OLD)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import time
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.config_files import find_config
@@ -60,7 +60,6 @@ def test_a_bad_one_is_refused_in_one_short_sentence(case: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@settings(max_examples=80, deadline=None)
 @given(st.text(max_size=200), st.integers(0, len(GOOD)), st.integers(0, 40))
 def test_whatever_is_put_into_a_model_it_is_read_or_refused(
     junk: str, place: int, gone: int

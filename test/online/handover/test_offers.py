@@ -53,11 +53,20 @@ def one_of(history: History) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return history.op, history.pv, history.dv
 
 
-CYCLE, CALM = past(PLANT, 1000), past(PROCESS, 300)
+@functools.cache
+def cycle() -> History:
+    """The loop whose valve sticks."""
+    return past(PLANT, 1000)
+
+
+@functools.cache
+def calm() -> History:
+    """The loop whose valve is ideal."""
+    return past(PROCESS, 300)
 
 
 def test_the_true_friction_is_not_doubted_by_a_cycle() -> None:
-    assert Judge(RULE, NONE).doubt(TRUE, CYCLE) == ""
+    assert Judge(RULE, NONE).doubt(TRUE, cycle()) == ""
 
 
 @pytest.mark.parametrize("poison", [(60.0, 59.0), (20.0, 1.0), (30.0, 22.8), (1.0, 0.9)])
@@ -65,12 +74,12 @@ def test_the_true_friction_is_not_doubted_by_a_cycle() -> None:
 def test_a_friction_far_from_the_true_one_is_doubted(
     poison: tuple[float, float], in_force: Maker
 ) -> None:
-    assert Judge(RULE, in_force).doubt(knowing(HeStiction(*poison)), CYCLE)
+    assert Judge(RULE, in_force).doubt(knowing(HeStiction(*poison)), cycle())
 
 
 @pytest.mark.parametrize("samples", [1, 199])
 def test_a_short_past_speaks_for_nothing(samples: int) -> None:
-    short = History(*(rows[:samples] for rows in one_of(CYCLE)))
+    short = History(*(rows[:samples] for rows in one_of(cycle())))
     assert f"only {samples} samples" in Judge(RULE, NONE).doubt(TRUE, short)
 
 
@@ -80,24 +89,24 @@ def test_a_friction_by_which_the_valve_never_moved_is_doubted() -> None:
 
 
 def test_a_model_that_says_since_when_it_holds_is_judged_by_these_samples() -> None:
-    history = joined(CYCLE, CALM)
+    history = joined(cycle(), calm())
     assert "no better" in Judge(OfferRule(offer_ratio=1.1), TRUE).doubt(NONE, history)
     assert Judge(RULE, TRUE, last_samples=250).doubt(NONE, history) == ""
     grown = knowing(HeStiction(7.5, 2.0))
-    assert "no better" in Judge(RULE, TRUE, last_samples=900).doubt(grown, CYCLE)
+    assert "no better" in Judge(RULE, TRUE, last_samples=900).doubt(grown, cycle())
 
 
 def test_the_friction_in_force_is_never_doubted() -> None:
-    short = History(*(rows[:5] for rows in one_of(CYCLE)))
+    short = History(*(rows[:5] for rows in one_of(cycle())))
     assert Judge(RULE, TRUE).doubt(TRUE, short) == ""
 
 
 def test_a_friction_of_a_healthy_valve_must_earn_itself_whatever_it_says_of_since_when() -> None:
     poison = knowing(HeStiction(20.0, 1.0))
-    assert Judge(RULE, NONE, last_samples=1).doubt(poison, CYCLE)
-    assert Judge(RULE, NONE, last_samples=10**30).doubt(poison, CYCLE)
+    assert Judge(RULE, NONE, last_samples=1).doubt(poison, cycle())
+    assert Judge(RULE, NONE, last_samples=10**30).doubt(poison, cycle())
 
 
 def test_what_was_rolled_back_is_not_judged_by_its_own_samples_alone() -> None:
     judge = Judge(RULE, TRUE, offered_before=True, last_samples=250)
-    assert "rolled back before" in judge.doubt(NONE, joined(CYCLE, CALM))
+    assert "rolled back before" in judge.doubt(NONE, joined(cycle(), calm()))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from stiction_ros.loop import Instrument
@@ -523,7 +523,6 @@ RECOVERED = SUCCESSION + 4  # samples
 GOOD = 30
 
 
-@settings(max_examples=100, deadline=None)
 @given(junk, st.sampled_from([*LOCKSTEP, "realtime"]), st.floats(0.0, 100.0))
 @example([(0.0, "pv", 4e9, 50.0)], "external", 0.0)
 @example([(30.0, "pv", k, 50.0) for k in range(3)], "realtime", 3.0)

@@ -55,7 +55,7 @@ def test_the_gap_of_a_healthy_loop_is_its_noise() -> None:
 
 
 @given(scale=st.floats(1e-3, 1e3))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_the_unit_of_pv_changes_no_ratio(scale: float) -> None:
     document = loop().to_mapping()
     output = document["process"]["outputs"][0]

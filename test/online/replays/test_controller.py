@@ -11,7 +11,7 @@ from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.node_settings import ControllerNodeSettings
 from stiction_ros.online.replays.bag import ReplayBag, Signal
 from stiction_ros.online.replays.controller import OpMatch, replay_controller
-from stiction_ros.records.run.gap_log import gap_log
+from stiction_ros.records.run.events import gap_log
 
 S = 10**9
 SAMPLES = 60

@@ -24,7 +24,7 @@ from stiction_ros.online.replays.result import Match
 from stiction_ros.online.replays.run import replay
 from stiction_ros.records.bag.messages import read_messages
 from stiction_ros.records.bag.writer import BagWriter
-from stiction_ros.records.run.gap_log import gap_log
+from stiction_ros.records.run.events import gap_log
 from stiction_ros.records.storage.mcap_scan import RawMessage
 from stiction_ros.texts import json_text
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from loops import stable_model, target_at
 from paper_cases import STICKY
@@ -39,7 +39,6 @@ def equation_22(
     return float(cost + x @ weights.terminal @ x)
 
 
-@settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), horizon=st.integers(2, 12), m=st.integers(1, 3))
 def test_cost_is_22_summed_along_the_hard_model(seed: int, horizon: int, m: int) -> None:
     random = np.random.default_rng(seed)

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from loops import limits_for, outputs_of
 from paper_cases import LIMITS, STICKY, situation, tuning, two_valves
@@ -42,7 +42,6 @@ def plan(mpc: PrintedEmbeddingMpc, at: PlanProblem) -> PrintedPlan:
     return found
 
 
-@settings(max_examples=30, deadline=None)
 @given(away=st.floats(-30.0, 30.0), searching=st.booleans())
 def test_what_is_applied_is_the_cheaper_under_the_hard_model(away: float, searching: bool) -> None:
     mpc = SEARCHING if searching else COMPENSATING

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from loops import first_order, kalman, limits_for, target_at, weights_for
 
@@ -21,7 +21,6 @@ def controller() -> PrintedInversionMpc:
     return PrintedInversionMpc(linear, (FRICTION,))
 
 
-@settings(deadline=None)
 @given(goal=st.floats(30.0, 70.0))
 def test_moves_beyond_the_smallest_jump_are_inverted_exactly(goal: float) -> None:
     start = np.array([50.0])

@@ -5,7 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from loops import stable_model, target_at
 from paper_cases import LIMITS, STICKY, situation, two_valves, weights
@@ -40,7 +40,6 @@ def test_it_finds_what_a_fine_grid_finds() -> None:
     assert cost(at, found) <= least
 
 
-@settings(max_examples=25, deadline=None)
 @given(away=st.floats(-40.0, 40.0), stem=st.floats(5.0, 95.0), share=st.floats(0.0, 1.0))
 def test_it_costs_no_more_than_resting_and_keeps_the_limits(
     away: float, stem: float, share: float

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bag_making import JOINT_STATE, SECOND, STORE, Bag, clock, joint_state
+from bag_making import JOINT_STATE, SECOND, STORE, Bag, clock, joint_state, read_bag
 from bag_trials import trials
 from mcap.writer import CompressionType, Writer
 
@@ -17,9 +17,7 @@ from stiction_ros.records.bag.finish import Packing, finish_bag
 from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.bag.repair import RepairStatus, repair_bag
 from stiction_ros.records.bag.writer import BagWriter
-from stiction_ros.records.run.bag_reader import read_bag
-from stiction_ros.records.storage.mcap_format import MAGIC
-from stiction_ros.records.storage.mcap_scan import McapScan
+from stiction_ros.records.storage.mcap_scan import MAGIC, McapScan
 
 SAMPLES = 300
 PATIENCE = 60.0  # s for one reading, which takes some milliseconds
@@ -88,7 +86,7 @@ def test_an_altered_byte_never_gives_a_wrong_value(whole: Path, tmp_path: Path) 
     expected, _ = read(whole)
     path = tmp_path / "altered.mcap"
     errors = 0
-    for data in altered(whole.read_bytes(), np.random.default_rng(11), trials(60, 500)):
+    for data in altered(whole.read_bytes(), np.random.default_rng(11), trials(20, 500)):
         path.write_bytes(data)
         found, error = read(path)
         errors += bool(error)
@@ -99,7 +97,7 @@ def test_an_altered_byte_never_gives_a_wrong_value(whole: Path, tmp_path: Path) 
 def test_an_altered_byte_never_gives_a_wrong_record(whole: Path, tmp_path: Path) -> None:
     expected = read_bag(whole)
     path = tmp_path / "altered.mcap"
-    for data in altered(whole.read_bytes(), np.random.default_rng(12), trials(20, 500)):
+    for data in altered(whole.read_bytes(), np.random.default_rng(12), trials(8, 500)):
         path.write_bytes(data)
         try:
             record = read_bag(path)
@@ -114,7 +112,7 @@ def test_a_finished_file_that_was_cut_gives_what_is_whole(whole: Path, tmp_path:
     data = whole.read_bytes()
     path = tmp_path / "cut.mcap"
     random = np.random.default_rng(13)
-    for size in random.integers(0, len(data), trials(40, 200)):
+    for size in random.integers(0, len(data), trials(15, 200)):
         path.write_bytes(data[: int(size)])
         found, error = read(path)
         assert found == expected[: len(found)]
@@ -135,7 +133,7 @@ def test_a_cut_journal_gives_every_whole_message(
     data = source.read_bytes()
     path = tmp_path / "cut.mcap"
     random = np.random.default_rng(14)
-    for size in random.integers(0, len(data), trials(40, 200)):
+    for size in random.integers(0, len(data), trials(15, 200)):
         path.write_bytes(data[: int(size)])
         found, error = read(path)
         assert found == written[: len(found)]
@@ -153,7 +151,7 @@ def test_a_repaired_file_is_whole_and_holds_nothing_else(
     data = whole.read_bytes()
     random = np.random.default_rng(15)
     path = tmp_path / "ill.mcap"
-    for _ in range(trials(15, 100)):
+    for _ in range(trials(6, 100)):
         if kind == "cut":
             path.write_bytes(data[: int(random.integers(100, len(data)))])
         else:
@@ -195,15 +193,6 @@ def test_a_damaged_summary_is_a_note_when_the_data_are_whole(tmp_path: Path) -> 
     ]
     assert repair_bag(path).status is RepairStatus.FINISHED
     assert repair_bag(path).status is RepairStatus.WHOLE
-
-
-def test_a_chunk_cannot_ask_for_more_memory_than_it_says(tmp_path: Path) -> None:
-    path = own_bag(tmp_path / "run", "none")
-    data = bytearray(path.read_bytes())
-    at = data.index(b"\x06")  # the first chunk's opcode follows the header
-    data[at + 9 + 16 : at + 9 + 24] = (2**40).to_bytes(8, "little")
-    path.write_bytes(data)
-    assert "size is wrong" in read(path)[1]
 
 
 def test_blocks_that_a_file_system_left_empty_are_left_out(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from bag_making import SECOND, Bag, clock
+from bag_making import SECOND, Bag, clock, read_bag
 from rosbags.rosbag2 import Reader
 
 from stiction_ros.errors import InputError
@@ -17,7 +17,6 @@ from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.bag.repair import RepairStatus, repair_bag
 from stiction_ros.records.bag.run_metadata import run_metadata
 from stiction_ros.records.bag.writer import BagWriter, Splitting
-from stiction_ros.records.run.bag_reader import read_bag
 from stiction_ros.records.storage.log_time import SIMULATED
 
 CONFIG = "node: /plant\nversion: '0.1'\nseed: 7\n"

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,11 @@ def package(prefix: Path, name: str, messages: dict[str, str]) -> None:
         (folder / f"{key}.json").write_text(json.dumps({"type_hashes": hashes}))
 
 
+@pytest.fixture(autouse=True)
+def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path), prepend=os.pathsep)
+
+
 def test_dependencies_follow_once_each(tmp_path: Path) -> None:
     package(
         tmp_path,
@@ -31,22 +37,22 @@ def test_dependencies_follow_once_each(tmp_path: Path) -> None:
         },
     )
     package(tmp_path, "b", {"Low": "int32 x\n"})
-    text, type_hash = definition("a/msg/Top", [tmp_path])
+    text, type_hash = definition("a/msg/Top")
     parts = text.split(SEPARATOR)
     assert [part.split("\n")[0] for part in parts[1:]] == ["MSG: b/Low", "MSG: a/Inner"]
     assert type_hash == "RIHS01_Top"
-    assert definition("a/Top", [tmp_path])[0] == text
+    assert definition("a/Top")[0] == text
 
 
 def test_errors_name_the_type_and_the_fix(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"no definition of no_msgs/msg/Thing.*AMENT_PREFIX_PATH"):
-        definition("no_msgs/msg/Thing", [tmp_path])
+        definition("no_msgs/msg/Thing")
     with pytest.raises(InputError, match="no message type"):
         definition("JointState")
     package(tmp_path, "c", {"Bare": "int8 x\n"})
     (tmp_path / "share/c/msg/Bare.json").unlink()
     with pytest.raises(InputError, match="no type hash"):
-        definition("c/msg/Bare", [tmp_path])
+        definition("c/msg/Bare")
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.topic_choice import TopicChoice
+from stiction_ros.records.bag.topic_choice import topic_choice
 
 
 @pytest.mark.parametrize(
@@ -20,8 +20,8 @@ from stiction_ros.records.bag.topic_choice import TopicChoice
 def test_names_and_expressions(
     names: list[str], regex: str, exclude: str, chosen: list[str]
 ) -> None:
-    choice = TopicChoice.of(names, regex, exclude)
-    assert [topic for topic in ("/pv", "/op", "/a/pv") if topic in choice] == chosen
+    choice = topic_choice(names, regex, exclude)
+    assert [topic for topic in ("/pv", "/op", "/a/pv") if choice(topic)] == chosen
 
 
 @pytest.mark.parametrize(
@@ -34,4 +34,4 @@ def test_names_and_expressions(
 )
 def test_errors(names: list[str], regex: str, exclude: str, said: str) -> None:
     with pytest.raises(InputError, match=said.replace("(", r"\(")):
-        TopicChoice.of(names, regex, exclude)
+        topic_choice(names, regex, exclude)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from bag_making import JOINT_STATE, SECOND, Bag, clock, joint_state
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
@@ -114,7 +114,6 @@ def test_metadata_counts_and_qos_agree_with_the_channels(bag: Bag) -> None:
     assert yaml.safe_load(channels["/pv"])[0]["deadline"] == {"sec": 9223372036, "nsec": 854775807}
 
 
-@settings(max_examples=30, deadline=None)
 @given(
     st.lists(
         st.tuples(

@@ -3,13 +3,14 @@ from __future__ import annotations
 import types
 
 from stiction_ros.records.bag.messages import BagMessage
-from stiction_ros.records.run.answer_times import answer_times
+from stiction_ros.records.run.events import answer_times
 
 
 def told(**values: str) -> BagMessage:
     items = [types.SimpleNamespace(key=key, value=value) for key, value in values.items()]
     status = types.SimpleNamespace(name="plant: status", values=items)
-    message = types.SimpleNamespace(status=[status])
+    header = types.SimpleNamespace(stamp=types.SimpleNamespace(sec=0, nanosec=0))
+    message = types.SimpleNamespace(header=header, status=[status])
     return BagMessage("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 0, 0, message)
 
 

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bag_making import JOINT_STATE, SECOND, STORE, Bag, joint_state
+from bag_making import JOINT_STATE, SECOND, STORE, Bag, joint_state, read_bag
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.record_file import CsvColumns
 from stiction_ros.records.bag.messages import read_messages, read_raw
-from stiction_ros.records.run.bag_reader import read_bag, read_bag_parts
+from stiction_ros.records.run.bag_reader import read_bag_parts
 from stiction_studies.as_given import open_record
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.records.run.bag_runs import Told, run_of, tell_runs
@@ -34,7 +34,6 @@ def test_a_restart_is_a_new_run_and_goes_on_beyond_the_end_of_the_old_one() -> N
     assert told(first + second) == [first, second]
 
 
-@settings(max_examples=80, deadline=None)
 @given(
     st.integers(12, 60),
     st.integers(12, 60),
@@ -62,7 +61,6 @@ def test_two_plants_that_alternate_all_the_time_are_told_apart() -> None:
     assert told(log) == [[500 + k for k in range(50)], list(range(50))]
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.sets(st.integers(1, 98), max_size=15))
 def test_lost_messages_break_no_run(lost: set[int]) -> None:
     kept = [k for k in range(100) if k not in lost]

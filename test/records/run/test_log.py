@@ -4,7 +4,8 @@ import math
 
 from bag_making import JOINT_STATE, SECOND, Bag, clock, joint_state
 
-from stiction_ros.records.run.log import Estimate, Fit, ModeChange, RunLog, read_run
+from stiction_ros.records.run.events import Estimate, Fit, ModeChange
+from stiction_ros.records.run.log import RunLog, read_run
 from stiction_ros.report.run.scoring import PhaseStatus, phases
 
 

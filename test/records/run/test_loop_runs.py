@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
@@ -97,7 +97,6 @@ def logs(draw: st.DrawFn) -> list[Message]:
     return log
 
 
-@settings(max_examples=80, deadline=None)
 @given(logs())
 def test_what_is_good_was_sent_for_that_sample_by_that_run(log: list[Message]) -> None:
     try:
@@ -116,7 +115,6 @@ def test_what_is_good_was_sent_for_that_sample_by_that_run(log: list[Message]) -
             assert part.sample_time == pytest.approx(STEP / 1e9)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(1, 3), st.integers(0, 500), st.integers(30, 150))
 def test_of_whole_runs_nothing_is_lost(count: int, first: int, samples: int) -> None:
     log = [m for number in range(count) for m in sent(number, max(first - number, 0), samples)]

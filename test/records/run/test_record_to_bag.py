@@ -4,15 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bag_making import JOINT_STATE, STORE
-from hypothesis import given, settings
+from bag_making import JOINT_STATE, STORE, read_bag
+from hypothesis import given
 from hypothesis import strategies as st
 
 pytest.importorskip("sensor_msgs", reason="the definitions of sensor_msgs are not installed")
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.bag_reader import read_bag
 from stiction_ros.records.run.record_to_bag import joint_state_bytes, write_bag
 
 TAGS = st.lists(
@@ -20,7 +19,6 @@ TAGS = st.lists(
 )
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.integers(0, 2**31 * 10**9 - 1), TAGS, st.data())
 def test_other_readers_decode_the_bytes(stamp: int, names: list[str], data: st.DataObject) -> None:
     floats = st.floats(allow_nan=False)

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.records.storage.log_time import LogTime
@@ -41,7 +41,6 @@ def test_two_clocks_that_alternate_are_the_later_one() -> None:
     ]
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.booleans(), st.integers(0, 40)), max_size=200))
 def test_it_never_runs_backwards_once_time_is_simulated(
     events: list[tuple[bool, int]],

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from stiction_ros.records.run.gap_log import GapLog
+from stiction_ros.records.run.events import GapLog
 from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.run.monitor_section import monitor_section
 from stiction_ros.report.run.report import write_run

@@ -97,7 +97,7 @@ def test_holds_and_rounds() -> None:
     assert round_length(np.cumsum(np.ones((100, 1)))[:, None]) is None
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(period=st.floats(15.0, 60.0), seed=st.integers(0, 100))
 def test_the_dominant_period_is_found(period: float, seed: int) -> None:
     rng = np.random.default_rng(seed)

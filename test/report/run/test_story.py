@@ -9,7 +9,8 @@ import pytest
 
 from stiction_ros.effects import Backlash, FrictionPair, SlipJumpPair, behaviours
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.log import ModeChange, RunLog, Text
+from stiction_ros.records.run.events import ModeChange, Text
+from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import round_of, tell
 

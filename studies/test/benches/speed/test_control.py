@@ -29,6 +29,7 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     return found
 
 
+@pytest.mark.trial
 def test_every_comparison_has_its_row(rows: list[dict[str, Any]]) -> None:
     assert [(row["case"], row["subject"]) for row in rows] == [
         ("tank, N_H = 50", "SU"),
@@ -42,6 +43,7 @@ def test_every_comparison_has_its_row(rows: list[dict[str, Any]]) -> None:
     ]
 
 
+@pytest.mark.trial
 def test_ratio_is_baseline_over_subject(rows: list[dict[str, Any]]) -> None:
     for row in rows:
         assert row["ratio"] == pytest.approx(row["baseline_ms"] / row["subject_ms"])

@@ -1,4 +1,4 @@
-"""Effects named without a model: the process is fitted again behind each of them."""
+"""Effects named without a model: the process is identified from the same records."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import pytest
 from gap_loops import loop, record, without_set_points
 
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
-from stiction_ros.discrepancy.data.first_model import first_model, liveliest_parts
-from stiction_ros.discrepancy.process.free_search import with_free_process
+from stiction_ros.discrepancy.process.first_model import first_model, liveliest_parts
 from stiction_ros.discrepancy.process.refit import (
     equations_of,
     longest_delay,
@@ -25,7 +24,7 @@ from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.records import Record
 
-QUICK = GapOptions(quick=True, free_process=True)
+QUICK = GapOptions(quick=True, process_fitted=True)
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
 
@@ -60,21 +59,9 @@ def test_the_friction_lies_in_its_interval(sticky: Discrepancy) -> None:
         assert high - low < 1.0
 
 
-def test_a_free_process_never_narrows_an_interval(sticky: Discrepancy) -> None:
-    base, fit = sticky.base_before, sticky.looks[0].scores.fits[0]
-    narrow = {"f_s": (3.9, 3.91), "f_d": (1.4, 1.41)}
-    wide = with_free_process(narrow, base, fit, 3)
-    assert all(wide[k][0] <= narrow[k][0] and narrow[k][1] <= wide[k][1] for k in narrow)
-
-
 def test_the_gap_closes_where_nothing_was_fitted(sticky: Discrepancy) -> None:
     assert sticky.closed > 0.8
     assert sticky.after[0].one_step_rmse < sticky.before[0].one_step_rmse
-
-
-def test_the_score_is_the_one_against_another_process(sticky: Discrepancy) -> None:
-    (effect,) = sticky.effects
-    assert effect.delta_bic == sticky.looks[0].scores.fits[0].delta_bic
 
 
 def test_the_model_found_runs_as_a_plant(sticky: Discrepancy) -> None:

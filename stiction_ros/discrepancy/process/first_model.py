@@ -7,9 +7,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.discrepancy.data.gate import open_gate
+from stiction_ros.discrepancy.process.refit import process_refitted
 from stiction_ros.errors import InputError
+from stiction_ros.identification.answer.identified_loop import identified_loop
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.linear.data import LinearKind
 from stiction_ros.identification.linear.fit import LinearOptions, fit_linear
+from stiction_ros.identification.methods import identify
+from stiction_ros.identification.result.identification import VerdictKind
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 
@@ -45,9 +51,10 @@ def _cut(record: Record, count: int) -> Record:
 def first_model(records: Sequence[Record], delay: tuple[int, int] = (0, 10)) -> LoopModel:
     """Return ARX equations fitted to the longest record, with ideal valves.
 
-    Without set-points the record is that of a loop at rest but for its own noise or cycle: of
-    many coefficients the model could make the controller turned upside down, so it has two a
-    and two b. The workflow fits them again and compares them with more poles.
+    Where identification finds friction, the process is the one that it found behind the friction.
+    Otherwise it is a linear fit from OP to PV, fitted again to the free run. Without set-point
+    moves of many coefficients such a fit could make the controller turned upside down, so it has
+    two a and two b.
 
     Args:
         records: one at least.
@@ -59,11 +66,25 @@ def first_model(records: Sequence[Record], delay: tuple[int, int] = (0, 10)) -> 
     if not records:
         raise InputError("no record", where="fit-linear")
     longest = max(liveliest_parts(records), key=len)
+    name = longest.name.removesuffix(".csv") or "loop"
+    found = identify(longest, IdentificationOptions(delay=delay))
+    if any(v.verdict in (VerdictKind.STICKY, VerdictKind.BACKLASH) for v in found.valves):
+        return _process_alone(identified_loop(longest, found, name))
     options = LinearOptions(kind=LinearKind.ARX, delay=delay)
     if not _moved(longest):
         options = LinearOptions(LinearKind.ARX, output_order=2, input_order=2, delay=delay)
-    found = fit_linear(longest, options)
-    return found.loop_model(longest.name.removesuffix(".csv") or "loop")
+    model = _process_alone(fit_linear(longest, options).loop_model(name))
+    runs, _ = open_gate(model, [longest])
+    return process_refitted(model, runs)
+
+
+def _process_alone(model: LoopModel) -> LoopModel:
+    """Return the model with ideal valves, no noise and no disturbance: they are not looked for."""
+    document = model.with_ideal_valves().to_mapping()
+    document.pop("disturbances", None)
+    for entry in document["process"]["outputs"]:
+        entry.pop("noise", None)
+    return LoopModel.from_mapping(document, model.name)
 
 
 def _moved(record: Record) -> bool:
