@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import functools
 import math
 
 import numpy as np
@@ -16,7 +17,7 @@ from stiction_ros.control.strategies import FallbackRule
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.paper.controllers.formulations import PrintedFormulations
+from stiction_ros.paper.controllers.formulations import as_printed
 from stiction_ros.paper.controllers.weights import (
     PaperTuning,
     ProgrammeCost,
@@ -330,7 +331,7 @@ class ControlSettings:
         if ProgrammeCost(self.programme_cost) is ProgrammeCost.PLAIN:
             weights = plain_weights(design.unaware)
         tuning = PaperTuning(weights, WarmStart(self.warm_start), self.first_move)
-        return dataclasses.replace(design, others=PrintedFormulations(tuning))
+        return dataclasses.replace(design, others=functools.partial(as_printed, tuning))
 
     def _op_limits(self, model: LoopModel) -> FloatArray:
         m = len(model.valves)

@@ -17,7 +17,7 @@ from stiction_ros.control.observer import Observer
 from stiction_ros.control.passage import Passage
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
 from stiction_ros.control.slip_check import SlipCheck
-from stiction_ros.control.strategies import Proposal, Situation, strategies
+from stiction_ros.control.strategies import Proposal, Situation, Strategies
 from stiction_ros.control.target import Target, TargetSelector
 from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
@@ -83,7 +83,7 @@ class MpcController:
         self._formulation = formulation_of(mode, design, unaware, self.valves)
         stand_in = None if self._formulation is unaware else unaware
         self._new_strategies = functools.partial(
-            strategies, self._formulation, stand_in, design.fallback
+            Strategies, self._formulation, stand_in, design.fallback
         )
         self._strategies = self._new_strategies()
         self._check = SlipCheck(m) if design.slip_check else None
@@ -174,6 +174,7 @@ class MpcController:
         self.stem = stem
         return total / max(counted, 1)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def step(
         self,
         pv: FloatArray,
@@ -199,35 +200,6 @@ class MpcController:
             reach: how far OP may be from ``applied`` whatever is planned, %, as at the first
                 sample of a run.
         """
-        with np.errstate(over="ignore", invalid="ignore"):
-            return self._step(pv, sp, dv, applied, preview, known, reach)
-
-    def pass_over(
-        self, pv: FloatArray, dv: FloatArray, applied: FloatArray, *, known: bool = True
-    ) -> None:
-        """Take in a sample that is not answered: OP stays where it is.
-
-        Args:
-            pv: measurement, shape (p,); what is not finite is missing.
-            dv, applied, known: as :meth:`step`.
-        """
-        with np.errstate(over="ignore", invalid="ignore"):
-            applied = self._take_in(pv, dv, applied, known)
-            kept = Proposal(applied, None, StepStatus.HELD, "")
-            for strategy in self._strategies:
-                strategy.applied(kept, False)
-            self._decide(applied, None)
-
-    def _step(
-        self,
-        pv: FloatArray,
-        sp: FloatArray,
-        dv: FloatArray,
-        applied: FloatArray,
-        preview: FloatArray | None,
-        known: bool,
-        reach: float,
-    ) -> StepResult:
         begin = time.perf_counter()
         trouble = _unusable(pv=pv, sp=sp, dv=dv)
         applied = self._take_in(pv, dv, applied, known)
@@ -242,7 +214,7 @@ class MpcController:
         situation = Situation(
             self.observer.state, target, self.stem, applied, self.valves.forms, trouble
         )
-        proposal, strategy = self._choose(situation)
+        proposal = self._strategies.choose(situation)
         op = self._valid(self._on_its_way(proposal, applied), applied)
         cut: list[int] = []
         if proposal.status is not StepStatus.FALLBACK:  # which has a rate of its own
@@ -260,10 +232,24 @@ class MpcController:
             proposal.plan,
             miss,
             seconds,
-            strategy,
+            proposal.strategy,
             proposal.age,
             self._gap(situation, proposal),
         )
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def pass_over(
+        self, pv: FloatArray, dv: FloatArray, applied: FloatArray, *, known: bool = True
+    ) -> None:
+        """Take in a sample that is not answered: OP stays where it is.
+
+        Args:
+            pv: measurement, shape (p,); what is not finite is missing.
+            dv, applied, known: as :meth:`step`.
+        """
+        applied = self._take_in(pv, dv, applied, known)
+        self._strategies.hold()
+        self._decide(applied, None)
 
     def _take_in(
         self, pv: FloatArray, dv: FloatArray, applied: FloatArray, known: bool
@@ -307,17 +293,6 @@ class MpcController:
         rows = np.vstack([sp, preview[:horizon]])
         rows = np.vstack([rows, np.repeat(rows[-1:], max(horizon + 1 - len(rows), 0), axis=0)])
         return self._target.follow(rows, disturbance, self._dv)
-
-    def _choose(self, situation: Situation) -> tuple[Proposal, str]:
-        for chosen in self._strategies:
-            proposal = chosen.propose(situation)
-            if proposal is not None:
-                break
-        else:
-            raise AssertionError("the last strategy always proposes")
-        for strategy in self._strategies:
-            strategy.applied(proposal, strategy is chosen)
-        return proposal, chosen.name
 
     def _on_its_way(self, proposal: Proposal, applied: FloatArray) -> FloatArray:
         """Return the OP (m,), %, of this sample; a slip that takes several ends as it began."""

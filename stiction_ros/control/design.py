@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from stiction_ros.control.aware import AwareFormulations
 from stiction_ros.control.embedding import EmbeddingTuning
+from stiction_ros.control.formulation import Formulation
 from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
 from stiction_ros.control.observer import ObserverTuning
+from stiction_ros.control.result import ControlMode
 from stiction_ros.control.strategies import FallbackRule
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.control.unaware import UnawareMpc
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.processes import LinearModel
+
+OtherFormulation = Callable[[ControlMode, UnawareMpc, Sequence[Behaviour | None]], Formulation]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,7 +37,8 @@ class ControlDesign:
         longest_wait: samples for which a jump waits for the disturbance estimate to come to rest.
         gap_samples: free samples of the optimality gap of each step; 0 leaves it out.
         valve_names, output_names: for messages; numbers stand in where empty.
-        others: makes embedding and inversion in place of the exact ones; None for these.
+        others: makes embedding or inversion in place of the exact ones, of its mode, of the unaware
+            formulation and of the friction of each valve, None for a healthy one; None for these.
     """
 
     model: LinearModel
@@ -49,7 +55,7 @@ class ControlDesign:
     gap_samples: int = 0
     valve_names: tuple[str, ...] = ()
     output_names: tuple[str, ...] = ()
-    others: AwareFormulations | None = None
+    others: OtherFormulation | None = None
 
     def without_rates(self) -> ControlDesign:
         """Return the design without rate limits, for a controller that moves nothing."""

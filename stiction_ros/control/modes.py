@@ -35,15 +35,14 @@ def formulation_of(
     known, others = valves.frictions, design.others
     if mode is ControlMode.HOLD:
         return None
-    if mode is ControlMode.EMBEDDING and others is not None:
-        return others.embedding(design.model, design.limits, known)
+    aware = mode in (ControlMode.EMBEDDING, ControlMode.INVERSION)
+    if aware and others is not None:
+        return others(mode, unaware, known)
     if mode is ControlMode.EMBEDDING:
         weights, spreads = design.embedding, valves.spreads
         embedding = EmbeddingMpc(design.model, weights, design.limits, known, design.jumps, spreads)
         _check_rates(design, embedding.least_kicks)
         return embedding
-    if mode is ControlMode.INVERSION and others is not None:
-        return others.inversion(unaware, known)
     if mode is ControlMode.INVERSION:
         inversion = InversionMpc(unaware, known)
         _check_rates(design, inversion.least_kicks)

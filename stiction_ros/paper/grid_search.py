@@ -30,8 +30,7 @@ from stiction_ros.paper.one_step_result import (
 )
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification
-from stiction_ros.paper.smoothed_laws import smooth_law
-from stiction_ros.paper.smoothed_stems import final_smoothing
+from stiction_ros.paper.smoothed_laws import final_smoothing, smooth_law
 from stiction_ros.records.record import Record
 from stiction_ros.signals.arx_fit import ArxOrders, Delays
 

@@ -52,15 +52,12 @@ class SearchLog:
 
     Attributes:
         squared_error: (12a) of the answer's (f_S, f_D, delays) under He's hard law with
-            least-squares coefficients, squared engineering units;
-            see :func:`stiction_ros.paper.equation_error.squared_error`.
+            least-squares coefficients, squared engineering units.
         objective: what the method itself minimised, same units.
         output_order, input_order, first: n_a, n_b and ε of both.
         points: grid points, or frictions at which the programme evaluated (12a).
         delays_tried: number of choices of delays.
         starts: every start of the nonlinear programme, in order; empty for the others.
-        friction, delays: what ``squared_error`` belongs to where that is not the answer of the
-            method: (f_S, f_D) per valve, %, and the t_d of each valve per output.
     """
 
     squared_error: float
@@ -71,8 +68,6 @@ class SearchLog:
     points: int
     delays_tried: int
     starts: tuple[SolvedStart, ...] = ()
-    friction: tuple[tuple[float, float], ...] = ()
-    delays: Delays = ()
 
     @property
     def solves(self) -> int:

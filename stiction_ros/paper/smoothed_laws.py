@@ -31,6 +31,7 @@ from stiction_ros.effects.friction.kano_smoothed import REST, kano_step
 from stiction_ros.errors import InputError
 
 OVERSHOOT = 1.99  # K of the semi-physical law, as published
+SMOOTHING = 1e4
 
 Simulated = Callable[[FloatArray, float, float, float], FloatArray]
 Step = Callable[[Sequence[Any], tuple[Any, Any], tuple[Any, Any], Any, Any], list[Any]]
@@ -93,6 +94,15 @@ def smooth_law(name: str) -> SmoothLaw:
             fix=f"use {' | '.join(SMOOTH_LAWS)}",
         )
     return SMOOTH_LAWS[name]
+
+
+def final_smoothing(limits: FloatArray) -> FloatArray:
+    """Return τ at which (5) equals (4), shape (m,), 1/%: 10⁴, more where OP spans below 10 %.
+
+    Args:
+        limits: f_max of every valve, shape (m,), %.
+    """
+    return np.maximum(SMOOTHING, 10.0 * SMOOTHING / np.maximum(limits, 1e-9))
 
 
 @compiled

@@ -16,7 +16,6 @@ from stiction_ros.survey.engines.engine import Engine, Task
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.groups import Group, grouped
 from stiction_ros.survey.journal import Journal, key_of
-from stiction_ros.survey.pages.unit import with_unit
 from stiction_ros.survey.ranking import ranked
 from stiction_ros.survey.survey_options import SurveyOptions
 
@@ -186,7 +185,6 @@ class _Run:
             self.before += 1
             if known.report is not None:
                 self._pages.add(Path(known.report).name)
-                self._name_unit(known)
             self._tell(known.name, ("taken from the survey before",))
             self._show(progress, known)
 
@@ -197,16 +195,6 @@ class _Run:
         name = self._page_name(entry.name)
         (self.plan.out / PAGES / name).write_text(page, encoding="utf-8")
         return dataclasses.replace(entry, report=f"{PAGES}/{name}")
-
-    def _name_unit(self, entry: Entry) -> None:
-        """Put the unit that is given now into a page that was written before."""
-        unit = self.plan.options.unit(entry.name)
-        if not unit or self.plan.out is None or entry.report is None:
-            return
-        file = self.plan.out / entry.report
-        if file.exists():
-            told = with_unit(file.read_text(encoding="utf-8"), unit)
-            file.write_text(told, encoding="utf-8")
 
     def _page_name(self, loop: str) -> str:
         base = re.sub(r"[^\w.-]+", "_", loop).strip("._")[:80] or "loop"

@@ -9,9 +9,10 @@ import pytest
 
 pytest.importorskip("sensor_msgs", reason="the definitions of sensor_msgs are not installed")
 
+from as_given import open_record
+
 from stiction_ros.cli.main import main
 from stiction_ros.cli.report import holds_live_run
-from stiction_studies.as_given import open_record
 
 BAGS = Path(__file__).parents[2] / "bags"
 

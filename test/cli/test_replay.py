@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "records"))
+from as_given import open_record
 from bag_cutting import cut_bag
 
 from stiction_ros.cli.main import main
 from stiction_ros.records.run.log import read_run
-from stiction_studies.as_given import open_record
 
 BAGS = Path(__file__).parents[2] / "bags"
 

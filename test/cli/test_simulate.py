@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from as_given import open_record
 
 from stiction_ros.cli.main import main
 from stiction_ros.config_files import find_config
@@ -18,7 +19,6 @@ from stiction_ros.loop import (
     simulate,
     simulate_closed_loop,
 )
-from stiction_studies.as_given import open_record
 
 FLOW = find_config("flow.loop.yaml")
 MOVES = find_config("flow.set_points.yaml")

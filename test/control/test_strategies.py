@@ -9,7 +9,7 @@ from loops import design_of, first_order, kalman, limits_for, weights_for
 
 from stiction_ros.control import ControlDesign, ControlMode, MpcController, StepStatus
 from stiction_ros.control.result import Plan, StepResult
-from stiction_ros.control.strategies import FallbackRule, Solve, Unaware, strategies
+from stiction_ros.control.strategies import FallbackRule, Strategies
 from stiction_ros.control.target import Target
 from stiction_ros.effects import HeStiction
 
@@ -47,7 +47,7 @@ def controller(
     """A controller whose formulation and stand-in are these."""
     frictions = (FRICTION,) if mode is ControlMode.EMBEDDING else (None,)
     made = MpcController(design(**rule), mode, frictions)
-    made._strategies = strategies(mine, standing_in, made.design.fallback)
+    made._strategies = Strategies(mine, standing_in, made.design.fallback)
     return made
 
 
@@ -189,16 +189,6 @@ def test_a_held_op_is_cut_to_the_limits() -> None:
     assert step(controller(mine, None, ControlMode.UNAWARE), 99.0).op.tolist() == [90.0]
 
 
-def test_the_order_is_the_documented_one() -> None:
-    mine = Switched([50.0])
-    names = [s.name for s in strategies(mine, mine, FallbackRule())]
-    assert names == ["solve", "limit", "shift", "unaware", "fallback", "hold"]
-    assert [s.name for s in strategies(mine, None, FallbackRule())] == [
-        n for n in names if n != Unaware.name
-    ]
-    assert [s.name for s in strategies(None, None, FallbackRule())] == ["hold"]
-
-
 def test_out_of_iterations_the_unaware_plan_is_checked() -> None:
     model = first_order()
     limits = dataclasses.replace(limits_for(model, 40.0, 60.0, 1.5), iterations=1)
@@ -225,9 +215,7 @@ def test_after_a_failure_the_solver_starts_anew() -> None:
     it = MpcController(
         design_of(model, limits, weights_for(model, 20), kalman(1)), ControlMode.UNAWARE
     )
-    solve = it._strategies[0]
-    assert isinstance(solve, Solve)
-    qp = solve.formulation._qp  # type: ignore[attr-defined]
+    qp = it._formulation._qp  # type: ignore[union-attr]
     it.step(PV, np.array([24.9]), NO_DV, np.array([50.0]))
     assert qp.limit_reached
     assert not qp._hard._ready

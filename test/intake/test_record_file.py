@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from as_given import open_record, read_csv
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.repairs import SENTINELS
 from stiction_ros.records.record import Record
-from stiction_studies.as_given import open_record, read_csv
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 

@@ -14,13 +14,13 @@ import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 
+from as_given import read_csv_parts
 from rclpy.context import Context
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import joint_state
-from stiction_studies.as_given import read_csv_parts
 
 LOOPS, SAMPLES, SECOND, BUDGET = 5, 99, 1_000_000_000, 600.0
 

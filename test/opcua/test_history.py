@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from as_given import read_csv_parts
 from plant_process import START, PlantProcess, wait_until
 from small_maps import MODE, OP, PV, SP, loop_tags
 
@@ -19,7 +20,6 @@ from stiction_ros.opcua.reading import TagQuality, TagReading
 from stiction_ros.opcua.tag_map import ValveTags
 from stiction_ros.records.csv_writer import write_csv
 from stiction_ros.records.quality import Quality
-from stiction_studies.as_given import read_csv_parts
 
 SCANS = 60
 

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.paper.programme.apparent_stiction import (
-    EllipseStatus,
-    apparent_stiction,
+    apparent_stictions,
     fit_ellipse,
 )
 
@@ -29,33 +28,27 @@ def test_points_of_an_ellipse_give_it_back(
     x = centre[0] + long * np.cos(turn) * np.cos(angle) - short * np.sin(turn) * np.sin(angle)
     y = centre[1] + long * np.cos(turn) * np.sin(angle) + short * np.sin(turn) * np.cos(angle)
     found = fit_ellipse(x, y)
-    assert found.found
-    assert found.centre == pytest.approx(centre, abs=1e-5 * long)
+    assert found is not None
     assert found.misfit < 1e-5
-    width = 2.0 * np.hypot(long * np.cos(angle), short * np.sin(angle))
-    assert found.width == pytest.approx(width, rel=1e-5)
     chord = 2.0 * long * short / np.hypot(short * np.cos(angle), long * np.sin(angle))
     assert found.chord == pytest.approx(chord, rel=1e-5)
 
 
 @pytest.mark.parametrize(
-    ("x", "y", "status"),
+    ("x", "y"),
     [
-        (np.arange(5.0), np.arange(5.0) ** 2, EllipseStatus.TOO_FEW_POINTS),
-        (np.arange(50.0), np.zeros(50), EllipseStatus.NO_ELLIPSE),
-        (np.arange(50.0), 2.0 * np.arange(50.0), EllipseStatus.NO_ELLIPSE),
+        (np.arange(5.0), np.arange(5.0) ** 2),
+        (np.arange(50.0), np.zeros(50)),
+        (np.arange(50.0), 2.0 * np.arange(50.0)),
     ],
 )
-def test_no_ellipse_is_a_status(x: np.ndarray, y: np.ndarray, status: EllipseStatus) -> None:
-    found = fit_ellipse(x, y)
-    assert found.status is status
-    assert found.chord == 0.0
+def test_there_need_not_be_an_ellipse(x: np.ndarray, y: np.ndarray) -> None:
+    assert fit_ellipse(x, y) is None
 
 
 def test_apparent_stiction_of_a_cycling_loop_is_near_the_band() -> None:
-    (found,) = apparent_stiction(loops.example1(1))
-    assert found.ellipse.found
-    assert 4.0 < found.stiction < 10.0  # f_S + f_D = 7
+    (found,) = apparent_stictions(loops.example1(1))
+    assert 4.0 < found < 10.0  # f_S + f_D = 7
 
 
 def test_the_output_that_draws_the_better_ellipse_is_taken() -> None:
@@ -64,4 +57,4 @@ def test_the_output_that_draws_the_better_ellipse_is_taken() -> None:
     both = dataclasses.replace(
         record, outputs=("NOISE", "PV1"), pv=np.hstack([noise, record.pv]), sp=None
     )
-    assert apparent_stiction(both)[0].output == "PV1"
+    assert apparent_stictions(both).tolist() == apparent_stictions(record).tolist()

@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, Identification, VerdictKind
-from stiction_ros.paper.equation_error import fit_outputs, squared_error
+from stiction_ros.paper.equation_error import fit_outputs
 from stiction_ros.paper.methods import identify
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme
 from stiction_ros.paper.programme.programme_data import ProgrammeData
-from stiction_ros.paper.programme.programme_terms import ALPHA, Terms
-from stiction_ros.paper.programme.reduced_programme import ReducedProgramme
+from stiction_ros.paper.programme.reduced_programme import ALPHA, ReducedProgramme
 from stiction_ros.paper.programme.starts import (
     StartKind,
     around,
@@ -27,8 +26,7 @@ from stiction_ros.paper.programme.starts import (
     inside,
     stiction_line,
 )
-from stiction_ros.paper.smoothed_laws import SMOOTH_LAWS
-from stiction_ros.paper.smoothed_stems import final_smoothing, smoothed_stems
+from stiction_ros.paper.smoothed_laws import SMOOTH_LAWS, final_smoothing, smooth_law
 from stiction_ros.records.record import Record
 from stiction_ros.signals.arx_fit import ArxOrders
 
@@ -70,7 +68,8 @@ def test_squared_error_is_that_of_he_s_law(found: Identification) -> None:
     assert log is not None
     friction = np.array([[valve.static_friction, valve.dynamic_friction]])
     orders = ArxOrders(log.output_order, log.input_order, log.first)
-    assert log.squared_error == squared_error(short(), friction, ((5,),), orders)
+    stems = smooth_law("he").hard_stems(short().op, friction)
+    assert log.squared_error == fit_outputs(short().pv, stems, ((5,),), orders).squared_error
     assert log.objective == pytest.approx(log.squared_error, rel=0.05)
 
 
@@ -82,7 +81,7 @@ def test_every_accepted_end_keeps_the_constraints(found: Identification) -> None
     for entry in ends:
         ((static, dynamic),) = entry.end
         assert -1e-6 <= dynamic <= static + 1e-5 <= np.ptp(record.op) + 1e-4
-        stem = smoothed_stems(record.op, np.array([[static, dynamic]]), np.array([1e4]))
+        stem = smooth_law("he").stems(record.op, np.array([[static, dynamic]]), np.array([1e4]))
         assert stem.var() >= (1.0 - 1e-3) * least
 
 
@@ -112,9 +111,11 @@ def test_without_the_coefficients_it_is_the_same_criterion(static: float, share:
     orders = ArxOrders.over(3, 3, [5])
     criterion = Criterion(StemTable(record, np.ptp(record.op, axis=0), orders), ((5,),))
     value, moving = criterion(friction)
-    wanted = fit_outputs(record.pv, smoothed_stems(record.op, friction, TAU), ((5,),), orders)
+    wanted = fit_outputs(
+        record.pv, smooth_law("he").stems(record.op, friction, TAU), ((5,),), orders
+    )
     assert value == pytest.approx(wanted.squared_error, rel=1e-6)
-    stem = smoothed_stems(record.op, friction, TAU)[0]
+    stem = smooth_law("he").stems(record.op, friction, TAU)[0]
     assert moving == pytest.approx([stem.var() / record.op.var()])
 
 
@@ -147,23 +148,20 @@ def test_derivatives_are_those_of_the_objective_and_constraints(law: str) -> Non
     if law == "kano":
         orders = dataclasses.replace(orders, channels=((1, (2, 1)), (2, (1, 2))))
     data = ProgrammeData.of(record.op, record.pv, np.ptp(record.op, axis=0), orders, law)
-    frame = FrictionProgramme(data, ((0, 1), (2, 0))).frame
-    x, smoothing = ca.MX.sym("x", frame.size), ca.MX.sym("tau", 2)
-    price = ca.MX.sym("price", 4)
-    zero, one, two = (Terms(frame, x, smoothing, order) for order in range(3))
-    objective, limits = zero.objective(), zero.constraints()
-    lagrangian = 1.3 * objective + ca.dot(price, limits)
-    ours = [one.gradient(), one.jacobian(), two.hessian(1.3, price)]
-    automatic = [
-        ca.gradient(objective, x),
-        ca.jacobian(limits, x),
-        ca.hessian(lagrangian, x)[0],
-    ]
-    both = ca.Function("both", [x, smoothing, price], [*ours, *automatic])
-    at = 0.2 * np.random.default_rng(0).standard_normal(frame.size)
+    programme = FrictionProgramme(data, ((0, 1), (2, 0)))
+    x, about = ca.MX.sym("x", programme.frame.size), ca.MX.sym("f", 4)
+    price, tau = ca.MX.sym("price", 4), ca.DM([3.0, 6.0])
+    found = []
+    for point, order in ((about, 2), (x[:4], 0)):  # expanded, and as it is
+        objective, limits = programme._terms(x, point, tau, order)
+        lagrangian = 1.3 * objective + ca.dot(price, limits)
+        derived = [ca.gradient(objective, x), ca.jacobian(limits, x)]
+        found += [objective, limits, *derived, ca.hessian(lagrangian, x)[0]]
+    at = 0.2 * np.random.default_rng(0).standard_normal(programme.frame.size)
     at[:4] = [0.4, 0.1, 0.3, 0.2]
-    values = [np.array(value) for value in both(at, [3.0, 6.0], [0.3, 0.2, 0.5, 0.7])]
-    for mine, theirs in zip(values[:3], values[3:], strict=True):
+    values = ca.Function("both", [x, about, price], found)(at, at[:4], [0.3, 0.2, 0.5, 0.7])
+    arrays = [np.array(value) for value in values]
+    for mine, theirs in zip(arrays[:5], arrays[5:], strict=True):
         assert np.abs(mine - theirs).max() <= 1e-9 * np.abs(theirs).max()
 
 

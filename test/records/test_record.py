@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from as_given import read_csv_parts
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,7 +19,6 @@ from stiction_ros.records.parts import joined, longest_part, only_part
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Gap, Record, Segment
 from stiction_ros.records.run.bag_reader import read_bag_parts
-from stiction_studies.as_given import read_csv_parts
 
 G, H, B, M = Quality.GOOD, Quality.HELD, Quality.BAD, Quality.MANUAL
 

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from as_given import read_csv, read_csv_parts
 from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.record import Record
 from stiction_ros.records.regular import split_at_gaps
-from stiction_studies.as_given import read_csv, read_csv_parts
 
 
 def parts_of(tmp_path: Path, times: np.ndarray, **columns: np.ndarray) -> tuple[Record, ...]:

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from as_given import read_csv
 from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
 from stiction_ros.records import Record
 from stiction_ros.records.csv_writer import write_csv
-from stiction_studies.as_given import read_csv
 
 
 def record(valves: tuple[str, ...], outputs: tuple[str, ...]) -> Record:

@@ -14,7 +14,6 @@ from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.assess import Assessed
 from stiction_ros.survey.engines.engine import Done, Task, lost
 from stiction_ros.survey.entry import Entry, Status
-from stiction_ros.survey.listing.headline import worked
 from stiction_ros.survey.listing.tables import HEAD, write_csv, write_xlsx
 from stiction_ros.survey.survey import Plan, survey
 from stiction_ros.survey.survey_options import SurveyOptions
@@ -113,17 +112,6 @@ def test_a_folder_that_holds_a_survey_is_not_written_over(tmp_path: Path) -> Non
     with pytest.raises(InputError, match="holds a survey; --resume goes on"):
         survey(_loops(2), Plan(SurveyOptions(), tmp_path), Counting())
     assert (tmp_path / "loops.jsonl").read_bytes() == before
-
-
-def test_units_that_are_given_later_come_onto_the_pages(tmp_path: Path) -> None:
-    survey(_loops(1), Plan(SurveyOptions(), tmp_path), Counting())
-    page = tmp_path / "loops" / "FIC000.html"
-    page.write_text('<b>2 <span class="unit">PV units</span></b>')
-    named = SurveyOptions(units=(("FIC000", "m³/h"),))
-    found = survey(_loops(1), Plan(named, tmp_path, resume=True), Counting())
-    assert page.read_text() == '<b>2 <span class="unit">m³/h</span></b>'
-    assert (found.before, found.to_dict()["before"]) == (1, 1)
-    assert worked(found).startswith("1 loop, 0 of them in this run in ")
 
 
 def test_other_options_do_not_go_on_with_it(tmp_path: Path) -> None:

@@ -15,7 +15,6 @@ S_0 is the x-width: the length of the chord through the centre along OP.
 from __future__ import annotations
 
 import dataclasses
-import enum
 import itertools
 
 import numpy as np
@@ -29,67 +28,40 @@ MIN_POINTS = 20
 INVERSE_CONSTRAINT = np.array([[0.0, 0.0, 0.5], [0.0, -1.0, 0.0], [0.5, 0.0, 0.0]])
 
 
-class EllipseStatus(enum.StrEnum):
-    """How the fit ended."""
-
-    OK = "ok"
-    TOO_FEW_POINTS = "too_few_points"
-    NO_ELLIPSE = "no_ellipse"
-
-
 @dataclasses.dataclass(frozen=True)
-class EllipseFit:
+class Ellipse:
     """An ellipse through points (x, y).
 
     Attributes:
-        status: anything but ``ok`` is a failure; all numbers are zero then.
-        centre: (x, y).
         chord: length of the chord through the centre along x; S_0 for x = OP, %.
-        width: whole extent along x.
-        height: whole extent along y.
         misfit: RMS of (radius / radius of the ellipse − 1) over the points.
     """
 
-    status: EllipseStatus
-    centre: tuple[float, float] = (0.0, 0.0)
-    chord: float = 0.0
-    width: float = 0.0
-    height: float = 0.0
-    misfit: float = 0.0
-
-    @property
-    def found(self) -> bool:
-        """Whether there is an ellipse."""
-        return self.status is EllipseStatus.OK
+    chord: float
+    misfit: float
 
 
-def fit_ellipse(x: FloatArray, y: FloatArray) -> EllipseFit:
-    """Return the least-squares ellipse through points x, y, each of shape (N,)."""
+def fit_ellipse(x: FloatArray, y: FloatArray) -> Ellipse | None:
+    """Return the least-squares ellipse through points x, y, each of shape (N,); None for none."""
     if len(x) < MIN_POINTS:
-        return EllipseFit(EllipseStatus.TOO_FEW_POINTS)
+        return None
     spread_x, spread_y = float(x.std()), float(y.std())
     if min(spread_x, spread_y) <= 1e-12 * max(1.0, float(np.abs(x).max()), float(np.abs(y).max())):
-        return EllipseFit(EllipseStatus.NO_ELLIPSE)
+        return None
     scaled_x, scaled_y = (x - x.mean()) / spread_x, (y - y.mean()) / spread_y
     conic = _conic(scaled_x, scaled_y)
     if conic is None:
-        return EllipseFit(EllipseStatus.NO_ELLIPSE)
+        return None
     A, B, C, D, E, F = conic.tolist()
     determinant = 4.0 * A * C - B * B
     x0, y0 = (B * E - 2.0 * C * D) / determinant, (B * D - 2.0 * A * E) / determinant
     level = -(F + 0.5 * (D * x0 + E * y0))  # q(x − x0) = level on the ellipse
     if not (np.isfinite(level) and level / A > 0.0):
-        return EllipseFit(EllipseStatus.NO_ELLIPSE)
+        return None
     dx, dy = scaled_x - x0, scaled_y - y0
     radius = np.sqrt(np.maximum((A * dx * dx + B * dx * dy + C * dy * dy) / level, 0.0))
-    return EllipseFit(
-        EllipseStatus.OK,
-        (float(x.mean() + x0 * spread_x), float(y.mean() + y0 * spread_y)),
-        chord=2.0 * float(np.sqrt(level / A)) * spread_x,
-        width=2.0 * float(np.sqrt(level * 4.0 * C / determinant)) * spread_x,
-        height=2.0 * float(np.sqrt(level * 4.0 * A / determinant)) * spread_y,
-        misfit=float(np.sqrt(np.mean((radius - 1.0) ** 2))),
-    )
+    chord = 2.0 * float(np.sqrt(level / A)) * spread_x
+    return Ellipse(chord, float(np.sqrt(np.mean((radius - 1.0) ** 2))))
 
 
 def _conic(x: FloatArray, y: FloatArray) -> FloatArray | None:
@@ -112,52 +84,27 @@ def _conic(x: FloatArray, y: FloatArray) -> FloatArray | None:
     return np.concatenate([q, to_linear @ q])
 
 
-@dataclasses.dataclass(frozen=True)
-class ApparentStiction:
-    """Apparent stiction of one valve.
-
-    Attributes:
-        valve, output: tags of the pair whose ellipse fits best.
-        rows: first and one past the last sample of the window that was used.
-        ellipse: its ellipse; :attr:`stiction` is meaningful when its status is ``ok``.
-    """
-
-    valve: str
-    output: str
-    rows: tuple[int, int]
-    ellipse: EllipseFit
-
-    @property
-    def stiction(self) -> float:
-        """S_0 ≈ f_S + f_D, % of OP; 0 without an ellipse."""
-        return self.ellipse.chord
-
-
-def apparent_stiction(record: Record) -> tuple[ApparentStiction, ...]:
-    """Return the apparent stiction of every valve of a record.
+def apparent_stictions(record: Record) -> FloatArray:
+    """Return S_0 ≈ f_S + f_D of every valve, shape (m,), % of OP; 0 without an ellipse.
 
     A set-point move draws a wide path that is not the cycle. So ``WINDOWS`` equal parts of the
     record are tried with every output, those in which OP spans between half of and the whole
     of what it spans in the middle part, and the ellipse of least misfit is taken. Where there
     is none the whole record is tried.
     """
-    return tuple(_of_valve(record, j) for j in range(len(record.valves)))
+    return np.array([_of_valve(record, j) for j in range(len(record.valves))])
 
 
-def _of_valve(record: Record, valve: int) -> ApparentStiction:
+def _of_valve(record: Record, valve: int) -> float:
     u, count = record.op[:, valve], len(record)
     edges = np.linspace(0, count, WINDOWS + 1).astype(int).tolist()
     windows = list(itertools.pairwise(edges))
     spans = [float(np.ptp(u[a:b])) if b > a else 0.0 for a, b in windows]
     middle = float(np.median(spans))
     quiet = [w for w, span in zip(windows, spans, strict=True) if 0.5 * middle <= span <= middle]
-    tried = [_pair(record, valve, i, rows) for rows in quiet for i in range(len(record.outputs))]
-    if not any(found.ellipse.found for found in tried):
-        tried = [_pair(record, valve, i, (0, count)) for i in range(len(record.outputs))]
-    return min(tried, key=lambda found: (not found.ellipse.found, found.ellipse.misfit))
-
-
-def _pair(record: Record, valve: int, output: int, rows: tuple[int, int]) -> ApparentStiction:
-    part = slice(*rows)
-    ellipse = fit_ellipse(record.op[part, valve], record.pv[part, output])
-    return ApparentStiction(record.valves[valve], record.outputs[output], rows, ellipse)
+    for tried in (quiet, [(0, count)]):
+        fits = [fit_ellipse(u[a:b], pv[a:b]) for a, b in tried for pv in record.pv.T]
+        found = [ellipse for ellipse in fits if ellipse is not None]
+        if found:
+            return min(found, key=lambda ellipse: ellipse.misfit).chord
+    return 0.0

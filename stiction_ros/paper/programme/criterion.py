@@ -14,8 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.paper.smoothed_laws import smooth_law
-from stiction_ros.paper.smoothed_stems import final_smoothing
+from stiction_ros.paper.smoothed_laws import final_smoothing, smooth_law
 from stiction_ros.records import Record
 from stiction_ros.signals.arx import lagged
 from stiction_ros.signals.arx_fit import ArxOrders, Delays

@@ -23,7 +23,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper.programme.programme_data import Frame, ProgrammeData
-from stiction_ros.paper.programme.programme_terms import Terms
+from stiction_ros.paper.programme.reduced_programme import ALPHA
 from stiction_ros.signals.arx_fit import Delays, fit_arx
 
 FEASIBILITY = 1e-6
@@ -146,10 +146,8 @@ class FrictionProgramme:
         )
 
     def _build_stems(self) -> Any:
-        friction, smoothing = (
-            ca.MX.sym("f", self.frame.valves, 2),
-            ca.MX.sym("tau", self.frame.valves),
-        )
+        valves = self.frame.valves
+        friction, smoothing = ca.MX.sym("f", valves, 2), ca.MX.sym("tau", valves)
         rows = [
             self.data.stems.expression(0, u, ca.vertcat(friction[j, :].T, smoothing[j]))[0]
             for j, u in enumerate(self.data.op)
@@ -157,43 +155,80 @@ class FrictionProgramme:
         return ca.Function("stems", [friction, smoothing], [ca.vertcat(*rows)])
 
     def _build_solver(self) -> Any:
-        problem, derivatives = self._build()
-        options = derivatives | {
+        """Return the solver; derivatives are those of stems expanded about the frictions of x."""
+        count = 2 * self.frame.valves
+        x, tau = ca.MX.sym("x", self.frame.size), ca.MX.sym("tau", self.frame.valves)
+        about, weight, price = ca.MX.sym("f", count), ca.MX.sym("w"), ca.MX.sym("v", count)
+        (f0, g0), (f1, g1), (f2, g2) = [self._terms(x, about, tau, k) for k in range(3)]
+        bent = ca.triu(ca.hessian(weight * f2 + ca.dot(price, g2), x)[0])
+
+        def here(*expressions: Any) -> list[Any]:
+            return list(ca.substitute(list(expressions), [about], [x[:count]]))
+
+        options: dict[str, Any] = {
             "print_time": False,
             "no_nlp_grad": True,
             "calc_f": False,
             "calc_g": False,
             "calc_lam_p": False,
             "ipopt": IPOPT | {"max_iter": MAX_ITERATIONS},
-        }
-        return ca.nlpsol("friction", "ipopt", problem, options)
-
-    def _build(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        x, smoothing = ca.MX.sym("x", self.frame.size), ca.MX.sym("tau", self.frame.valves)
-        weight, price = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", 2 * self.frame.valves)
-        terms = [Terms(self.frame, x, smoothing, order) for order in range(3)]
-        value, limits = terms[0].objective(), terms[0].constraints()
-        functions: dict[str, Any] = {
             "grad_f": ca.Function(
-                "grad_f",
-                [x, smoothing],
-                [terms[1].objective(), terms[1].gradient()],
-                ["x", "p"],
-                ["f", "grad_f_x"],
+                "grad_f", [x, tau], here(f1, ca.gradient(f1, x)), ["x", "p"], ["f", "grad_f_x"]
             ),
             "jac_g": ca.Function(
-                "jac_g",
-                [x, smoothing],
-                [terms[1].constraints(), terms[1].jacobian()],
-                ["x", "p"],
-                ["g", "jac_g_x"],
+                "jac_g", [x, tau], here(g1, ca.jacobian(g1, x)), ["x", "p"], ["g", "jac_g_x"]
             ),
             "hess_lag": ca.Function(
                 "hess_lag",
-                [x, smoothing, weight, price],
-                [ca.triu(terms[2].hessian(weight, price))],
+                [x, tau, weight, price],
+                here(bent),
                 ["x", "p", "lam_f", "lam_g"],
                 ["triu_hess_gamma_x_x"],
             ),
         }
-        return {"x": x, "p": smoothing, "f": value, "g": limits}, functions
+        objective, limits = here(f0, g0)
+        problem = {"x": x, "p": tau, "f": objective, "g": limits}
+        return ca.nlpsol("friction", "ipopt", problem, options)
+
+    def _terms(self, x: Any, about: Any, smoothing: Any, order: int) -> tuple[Any, Any]:
+        """Return (12a) over its value at the ARX start, and (12e), then (12f), of every valve.
+
+        These are f_S − f_D and σ²(χ)/(α σ²(u)) − 1, for stems expanded to ``order`` in the
+        frictions about those given.
+        """
+        count, valves = self.data.op.shape[1], self.frame.valves
+        stems = [self._stem(j, x, about, smoothing, order) for j in range(valves)]
+        total = sum(ca.sumsqr(self._residual(i, x, stems)) for i in range(self.frame.outputs))
+        ordered = [x[2 * j] - x[2 * j + 1] for j in range(valves)]
+        moving = [
+            ca.sumsqr(stem - ca.sum2(stem) / count) / (ALPHA * float(op.var()) * count) - 1.0
+            for stem, op in zip(stems, self.data.op, strict=True)
+        ]
+        return total / (self.frame.outputs * self.frame.start_error), ca.vertcat(*ordered, *moving)
+
+    def _stem(self, j: int, x: Any, about: Any, smoothing: Any, order: int) -> Any:
+        """Return χ of valve j, shape (1, N), as its Taylor polynomial in f_S and f_D."""
+        own = slice(2 * j, 2 * j + 2)
+        figures = ca.vertcat(about[own], smoothing[j])
+        stem, *rows = self.data.stems.expression(order, self.data.op[j], figures)
+        static, dynamic = ca.vertsplit(x[own] - about[own])
+        for row, step in zip(rows[:2], (static, dynamic), strict=False):
+            stem = stem + step * row
+        squares = (0.5 * static**2, static * dynamic, 0.5 * dynamic**2)
+        for row, step in zip(rows[2:], squares, strict=False):
+            stem = stem + step * row
+        return stem
+
+    def _residual(self, i: int, x: Any, stems: list[Any]) -> Any:
+        """Return the error of the prediction (12c) of output i, shape (1, N − ε)."""
+        frame, orders, count = self.frame, self.data.orders, self.data.op.shape[1]
+        place = 2 * frame.valves + i * frame.width
+        theta = frame.theta[i] + ca.mtimes(ca.DM(frame.basis[i]), x[place : place + frame.width])
+        lagged = [
+            stem[:, orders.first - delay - lag : count - delay - lag]
+            for stem, delay in zip(stems, self.delays[i], strict=True)
+            for lag in range(1, orders.input + 1)
+        ]
+        ones = ca.DM.ones(1, count - orders.first)
+        phi = ca.vertcat(ca.DM(frame.past[i].T), *lagged, ones)
+        return ca.mtimes(theta.T, phi) - ca.DM(self.data.pv[i, orders.first :][None, :])

@@ -31,7 +31,7 @@ from stiction_ros.paper.one_step_result import (
     result,
 )
 from stiction_ros.paper.paper_options import PaperOptions
-from stiction_ros.paper.programme.apparent_stiction import apparent_stiction
+from stiction_ros.paper.programme.apparent_stiction import apparent_stictions
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.reduced_programme import ReducedProgramme, ReducedSolution
 from stiction_ros.paper.programme.starts import Start, StartKind, around, candidates
@@ -143,8 +143,7 @@ class _Search:
 
     def _rank(self) -> dict[Delays, list[Start]]:
         """Return all candidates, the best first, for each choice of delays."""
-        found = [entry.stiction for entry in apparent_stiction(self.record)]
-        stictions = np.minimum(np.array(found), self.table.limits)
+        stictions = np.minimum(apparent_stictions(self.record), self.table.limits)
         points = candidates(self.table.limits, stictions, POINTS)
         ranked = {}
         for delays, programme in self.programmes.items():

@@ -20,13 +20,13 @@ from stiction_ros.paper.one_step_result import (
     result,
 )
 from stiction_ros.paper.paper_options import PaperOptions
-from stiction_ros.paper.programme.apparent_stiction import apparent_stiction
+from stiction_ros.paper.programme.apparent_stiction import apparent_stictions
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme, Solution
 from stiction_ros.paper.programme.nlp import MAX_CHOICES, NO_END, pairs
 from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.starts import draw_starts
 from stiction_ros.paper.search_log import PaperIdentification, SolvedStart
-from stiction_ros.paper.smoothed_stems import final_smoothing
+from stiction_ros.paper.smoothed_laws import final_smoothing
 from stiction_ros.records import Record
 from stiction_ros.signals.arx_fit import Delays
 
@@ -42,8 +42,8 @@ def identify_as_printed(
     orders = check_record(record, options)
     choices = delay_choices(record, options, MAX_CHOICES)
     limits = friction_limits(record, options)
-    stictions = np.array([entry.stiction for entry in apparent_stiction(record)])
-    starts = draw_starts(limits, np.minimum(stictions, limits), options.starts)
+    stictions = np.minimum(apparent_stictions(record), limits)
+    starts = draw_starts(limits, stictions, options.starts)
     smoothing = final_smoothing(limits)
     data = ProgrammeData.of(record.op, record.pv, limits, orders, options.law)
     ends: list[tuple[Delays, Solution]] = []

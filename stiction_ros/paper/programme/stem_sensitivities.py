@@ -21,7 +21,7 @@ import casadi as ca
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.paper.smoothed_laws import SmoothLaw, smooth_law
+from stiction_ros.paper.smoothed_laws import SmoothLaw
 
 BLOCK = 250
 SECOND = ((0, 0), (0, 1), (1, 1))
@@ -77,12 +77,12 @@ class StemSensitivities:
     """CasADi expressions of the stem for a given OP.
 
     Attributes:
-        samples: N of every OP that it takes.
         law: of the valves.
     """
 
-    def __init__(self, samples: int, law: SmoothLaw | None = None) -> None:
-        self.samples, self.law = samples, law or smooth_law("he")
+    def __init__(self, samples: int, law: SmoothLaw) -> None:
+        """Prepare for OPs of N ``samples``."""
+        self.law = law
         self._blocks = []
         for order in range(3):
             step = _step(self.law, order)

@@ -13,7 +13,6 @@ from stiction_ros.pages.signals import Units, all_signals, close_look
 from stiction_ros.records.record import Record
 from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.pages.trend import PLACE
-from stiction_ros.survey.pages.unit import unit_mark
 from stiction_ros.survey.pages.words import (
     PERCENT,
     cause_words,
@@ -39,6 +38,8 @@ OPTIONS = {
 }
 
 LIST = "../survey.html"
+NO_UNIT = "PV units"
+"""What stands where no unit was given."""
 
 
 def loop_page(
@@ -57,6 +58,7 @@ def loop_page(
         gain: mapping of ``gain --json``, None where it was not simulated.
         unit: of PV; empty where none was given.
     """
+    unit = text(unit or NO_UNIT)
     headline = HEADLINES.get(entry.verdict or "", "Not judged")
     op_unit = "% of travel" if entry.op_unit == PERCENT else "OP's own unit"
     cycle = entry.oscillation
@@ -70,9 +72,9 @@ def loop_page(
     ]
     if cycle is not None and cycle.period is not None:
         cards.append(card("period of the cycle", period(cycle.period)))
-        cards.append(card("amplitude of the cycle", f"{figure(cycle.amplitude)} {unit_mark(unit)}"))
+        cards.append(card("amplitude of the cycle", f"{figure(cycle.amplitude)} {unit}"))
     known = found.stem.shape == record.op.shape
-    units = Units(unit_mark(unit), text(op_unit))
+    units = Units(unit, text(op_unit))
     sentence = next((o.cause.sentence for o in found.outputs if o.cause is not None), "")
     reason = found.reason
     parts = [
@@ -126,7 +128,7 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str, op_unit: str) -> str:
     titles = "".join(f"<th scope='col'>{text(title)}</th>" for title in head)
     return (
         f"<h2>What would help</h2><p class='soft'>Amplitude and mean |PV−SP| in "
-        f"{unit_mark(unit)}, travel in {text(op_unit)}.</p><table class='list'><thead><tr>"
+        f"{unit}, travel in {text(op_unit)}.</p><table class='list'><thead><tr>"
         f"{titles}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
     )
 

@@ -11,7 +11,7 @@ from stiction_ros.cli.shared.searches import METHODS
 COUNTED = METHODS
 """Methods that ``stiction paper --success`` counts."""
 
-FIGURES = (1, 2, 3, 4, 5, 6)
+FIGURES = (2, 3, 5, 6)  # 1 and 4 are schemes
 TABLES = (
     "1",
     "2",

@@ -19,7 +19,7 @@ from stiction_ros.settings import settings_of
 from stiction_studies.faults.terms import Pace
 
 if TYPE_CHECKING:
-    from stiction_studies.faults.soak import Soaked, Stolen
+    from stiction_studies.faults.soak import Soaked
 
 
 def add(commands: Any) -> None:
@@ -88,15 +88,11 @@ def parameters(options: argparse.Namespace, directory: Path) -> dict[str, dict[s
 
 
 def _soak(options: argparse.Namespace, directory: Path) -> Soaked:
-    from stiction_ros.online.session import Scenario
     from stiction_studies.faults.soak import soak
 
     seconds = math.inf if options.hours is None else 3600.0 * options.hours
-    period = 0.0
-    if options.pace == Pace.REALTIME:
-        period = Scenario.load(find(options.scenario)).plant.sample_time / options.speed
     with bar(f"soak {options.scenario}") as show:
-        return soak(parameters(options, directory), directory, seconds, period, show)
+        return soak(parameters(options, directory), directory, seconds, show)
 
 
 def _made(directory: Path) -> Path:
@@ -115,8 +111,6 @@ def _print(name: str, found: Soaked) -> None:
     _list(console, "missed", found.missed)
     _list(console, "told besides", found.told)
     _list(console, "samples of the past kept at most", found.kept)
-    if found.stolen is not None:
-        console.print(_of_the_host(found.stolen), markup=False)
     table = Table("node", "RSS at a tenth, MB", "at the end, MB", "ratio")
     for node, memory in found.memory.items():
         sizes = (f"{memory.tenth / 1e6:.1f}", f"{memory.end / 1e6:.1f}")
@@ -124,13 +118,6 @@ def _print(name: str, found: Soaked) -> None:
     console.print(table)
     for reason in found.reasons:
         console.print(f"{name}: {reason}", markup=False)
-
-
-def _of_the_host(stolen: Stolen) -> str:
-    text = f"taken by the host of this machine: {stolen.seconds:.1f} s, at most "
-    text += f"{stolen.largest:.2f} s in a look; two samples or more in {stolen.long} of "
-    text += f"{stolen.looks} looks, then missed {stolen.missed_then} of {stolen.missed}"
-    return text
 
 
 def _list(console: Any, what: str, values: Mapping[str, object]) -> None:

@@ -10,7 +10,13 @@ from stiction_studies.faults.fault import Fault
 from stiction_studies.faults.judgement.bag_check import check_bag
 from stiction_studies.faults.judgement.flow import CALM, new_ops, recovered
 from stiction_studies.faults.judgement.judge import LOOP, Outcome, judge
-from stiction_studies.faults.judgement.notices import GONE_WITHIN, SHOWN_WITHIN, level_at, look_for
+from stiction_studies.faults.judgement.notices import (
+    GONE_WITHIN,
+    SHOWN_WITHIN,
+    changes_told,
+    level_at,
+    look_for,
+)
 from stiction_studies.faults.loop.reference import allowed_move
 from stiction_studies.faults.loop.running import RunningLoop
 from stiction_studies.faults.loop.setting_up import HAND_OVER, SETTLING, WARM_UP
@@ -79,12 +85,8 @@ def run_case(
 
 def _tell(seen: Observation, path: Path) -> None:
     """Write every change of a status, in seconds after the fault began."""
-    told: dict[str, tuple[str, str]] = {}
     lines = [f"the fault was over after {seen.over - seen.begun:.2f} s"]
-    for one in seen.statuses:
-        if told.get(one.node) != (one.level, one.text):
-            told[one.node] = one.level, one.text
-            lines.append(f"{one.wall - seen.begun:8.2f} {one.node} {one.level}: {one.text}")
+    lines += changes_told(seen.statuses, seen.begun)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -39,9 +38,6 @@ TOLD = (
     ("plant", "pv_to_op_ms_max"),
 )
 STALL = 300.0  # s without a sample
-STAT = Path("/proc/stat")
-LONG = 2  # samples: the host has taken enough that one is missed
-TOLD_AFTER = 3  # looks within which a node tells of what it missed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,7 +63,6 @@ class Soaked:
         told: what else the nodes have counted, by node and key.
         kept: most samples of the past that a node keeps.
         memory: of every node.
-        stolen: what the host has taken, see :class:`Stolen`; None where the system does not tell.
         failures: nodes that ended when they should not have, a run that stood still.
     """
 
@@ -78,7 +73,6 @@ class Soaked:
     kept: Mapping[str, int]
     memory: Mapping[str, Memory]
     failures: tuple[str, ...] = ()
-    stolen: Stolen | None = None
 
     @property
     def reasons(self) -> list[str]:
@@ -104,68 +98,6 @@ class Soaked:
         }
         plain = dataclasses.asdict(self) | {"memory": memory}
         return plain | {"passed": not self.reasons, "reasons": self.reasons}
-
-
-@dataclasses.dataclass(frozen=True)
-class Stolen:
-    """Time that the host of a virtual machine has taken from its processors (``steal``).
-
-    What it takes no program can make up for: a sample of 10 ms does not outlast 20 ms without a
-    processor. It is told beside what was missed, and excuses nothing.
-
-    Attributes:
-        seconds: in all, of all processors.
-        largest: in one look, s.
-        looks: how often it was looked.
-        long: looks in which it took two samples or more.
-        missed: samples that were missed.
-        missed_then: of these, in or right after such looks.
-    """
-
-    seconds: float = 0.0
-    largest: float = 0.0
-    looks: int = 0
-    long: int = 0
-    missed: int = 0
-    missed_then: int = 0
-
-
-class StolenWatch:
-    """Follows what the host takes, and what is missed meanwhile."""
-
-    def __init__(self, period: float) -> None:
-        """Begin; ``period`` is the wall time of a sample, s."""
-        self.found = Stolen()
-        self._least = LONG * period
-        self._last: tuple[float, int] | None = None
-        self._recent = [False] * TOLD_AFTER
-
-    def look(self, stolen: float | None, missed: int) -> None:
-        """Note seconds taken since the system began, and samples missed since the run did."""
-        if stolen is None:
-            return
-        if self._last is not None:
-            taken, more = stolen - self._last[0], missed - self._last[1]
-            long = taken >= self._least > 0.0
-            self._recent = [*self._recent[1:], long]
-            self.found = Stolen(
-                self.found.seconds + taken,
-                max(self.found.largest, taken),
-                self.found.looks + 1,
-                self.found.long + long,
-                missed,
-                self.found.missed_then + (more if any(self._recent) else 0),
-            )
-        self._last = stolen, missed
-
-
-def stolen_seconds(stat: Path = STAT) -> float | None:
-    """Return the seconds that the host has taken so far; None where the system does not tell."""
-    try:
-        fields = stat.read_text(encoding="ascii").splitlines()[0].split()
-        return int(fields[8]) / os.sysconf("SC_CLK_TCK")
-    except (OSError, IndexError, ValueError):
-        return None
 
 
 class Readings:
@@ -196,7 +128,6 @@ def soak(
     nodes: Mapping[str, Mapping[str, Any]],
     directory: Path,
     seconds: float,
-    period: float,
     progress: Callable[[float], None],
 ) -> Soaked:
     """Run the nodes until the plant has run its samples, or for ``seconds``.
@@ -205,7 +136,6 @@ def soak(
         nodes: parameters by node.
         directory: for parameters, logs and the bag.
         seconds: wall time; infinite for as long as the samples take.
-        period: wall time of a sample, s; 0 in lockstep, which waits for every one.
         progress: told the share that is done.
     """
     from stiction_studies.faults.loop.fault_probe import Probe
@@ -216,7 +146,7 @@ def soak(
         name: NodeProcess(name, values, directory, environment) for name, values in nodes.items()
     }
     wanted = int(nodes["plant"].get("samples", 0))
-    readings, failures, watch = Readings(), list[str](), StolenWatch(period)
+    readings, failures = Readings(), list[str]()
     begun = time.monotonic()
     last = (begun, 0)
     try:
@@ -232,7 +162,6 @@ def soak(
                 readings.add(share, name, process.resident())
                 if process.code is not None:
                     failures.append(f"{name} ended with code {process.code}")
-            watch.look(stolen_seconds(), sum(_missed(probe.values).values()))
             last = (now, sample) if sample != last[1] else last
             if now - last[0] > STALL:
                 failures.append(f"no sample for {STALL:g} s at sample {sample}")
@@ -256,7 +185,6 @@ def soak(
         kept(nodes),
         readings.memory(),
         tuple(failures),
-        watch.found if watch.found.looks else None,
     )
 
 

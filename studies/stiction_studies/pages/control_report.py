@@ -3,34 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
-
 from stiction_ros.pages.frame import framed, text
+from stiction_ros.pages.plot import SCRIPT, Curve, over_time
 from stiction_ros.paper.controllers.weights import ProgrammeCost
 from stiction_ros.report.page import Cell, number, table
 from stiction_ros.report.run.story import TANK_UNITS
-from stiction_studies.drawing import (
-    BLUE,
-    DPI,
-    GREY,
-    INK,
-    ORANGE,
-    Drawing,
-    data_limits,
-    embedded,
-    style,
-)
-from stiction_studies.examples.control_study import COLUMNS, ColumnRun, StudyOptions, Trial
+from stiction_studies.examples.control_study import COLUMNS, StudyOptions, Trial
 from stiction_studies.pages.control_scores import ColumnScore, mean_score, score_trial
 
 PLANT_TITLES = {"tank": "the nonlinear tank (A.1)", "linear": "the linear plant (A.3)"}
-_COLUMN_WIDTH, _ROW_HEIGHT = 3.1, 1.75  # inches
+CONTROLLERS = ("op", "free", "pv", "stem", "ink")  # colours, in the order of COLUMNS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,26 +96,23 @@ def rows_of(study: PlantStudy, *, short: bool = False) -> list[list[str]]:
 
 
 def report_study(studies: Sequence[PlantStudy], directory: Path) -> Path:
-    """Write ``compare.html`` and its figures as PNG and SVG, and return the page."""
+    """Write ``compare.html`` and return it."""
     parts = [
         "<h1>Example 2: three formulations of the paper, one exact, one without friction</h1>",
         f'<p class="soft">{text(describe(studies[0]))}</p>',
     ]
     for study in studies:
-        drawing = draw_study(study)
-        drawing.save(directory)
-        (directory / f"{drawing.name}.svg").write_bytes(svg(drawing))
         title = PLANT_TITLES[study.options.plant]
         rows: list[list[Cell]] = [list(row) for row in rows_of(study)]
         parts += [
             f"<h2>{text(title[0].upper() + title[1:])}</h2>",
             table(HEAD, rows, texts=2),
             f"<p>{text(_choices(study))}</p>",
-            embedded(drawing),
+            figures_of(study),
         ]
     parts.append(f'<p class="soft">{text(_NOTE)}</p>')
     target = directory / "compare.html"
-    page_text = framed("Example 2: controllers compared", parts)
+    page_text = framed("Example 2: controllers compared", parts, SCRIPT)
     target.write_text(page_text, encoding="utf-8")
     return target
 
@@ -169,62 +152,37 @@ def describe(study: PlantStudy) -> str:
     return "; ".join(told)
 
 
-def draw_study(study: PlantStudy) -> Drawing:
-    """Draw outputs, OP and stems of the first seed, one column per controller."""
+def figures_of(study: PlantStudy) -> str:
+    """Return each output under all controllers, then OP and stem of each valve that sticks."""
     trial = study.trial
-    with style():
-        record = trial.runs["unaware"].run.record
-        rows = len(record.outputs) + len(record.valves)
-        size = (_COLUMN_WIDTH * len(COLUMNS), 0.8 + _ROW_HEIGHT * rows)
-        figure = Figure(figsize=size, dpi=DPI, layout="constrained")
-        axes = figure.subplots(rows, len(COLUMNS), squeeze=False, sharex=True, sharey="row")
-        for j, column in enumerate(COLUMNS):
-            _draw_column(axes[:, j], trial.runs[column.key])
-            axes[0, j].set_title(column.title)
-            axes[-1, j].set_xlabel("time (h)")
-        for i, tag in enumerate(record.outputs):
-            values = [trial.runs[c.key].run.pv_clean[:, i] for c in COLUMNS]
-            data_limits(axes[i, 0], values)
-            axes[i, 0].set_ylabel(f"{tag} ({TANK_UNITS[tag]})")
-        for i, tag in enumerate(record.valves, start=len(record.outputs)):
-            axes[i, 0].set_ylabel(f"{tag} (%)")
-        lines = [*axes[0, 0].get_lines(), *axes[len(record.outputs), 0].get_lines()]
-        named = [line for line in lines if not line.get_label().startswith("_")]
-        figure.legend(handles=named, loc="outside upper left", ncols=len(named))
-    plant = PLANT_TITLES[study.options.plant]
-    return Drawing(
-        f"figure6_{study.options.plant}",
-        f"Figure 6 on {plant}",
-        f"Process outputs, controller outputs and stems; seed {trial.seed}. The columns carry "
-        "the same noise and the same set-points.",
-        figure,
+    runs = [(column.title, trial.runs[column.key].run) for column in COLUMNS]
+    record = runs[0][1].record
+    assert record.sp is not None
+    drawn = []
+    for i, tag in enumerate(record.outputs):
+        curves = [
+            Curve(title, kind, run.pv_clean[:, i])
+            for (title, run), kind in zip(runs, CONTROLLERS, strict=True)
+        ]
+        curves.append(Curve("SP", "sp", record.sp[:, i], steps=True))
+        drawn.append(over_time(f"{tag} without noise.", record.time, curves, _axis(tag)))
+    for tag in trial.sticky:
+        j = record.valves.index(tag)
+        for title, run in runs:
+            assert run.record.stem is not None
+            curves = [
+                Curve("OP", "op", run.record.op[:, j], steps=True),
+                Curve("stem", "stem", run.record.stem[:, j], steps=True),
+            ]
+            drawn.append(over_time(f"{tag} under {title}.", record.time, curves, f"{tag} (%)"))
+    return (
+        f"<p>Seed {trial.seed}: all controllers have the same noise and the same set-points.</p>"
+        + "".join(drawn)
     )
 
 
-def svg(drawing: Drawing) -> bytes:
-    """Return the figure as SVG."""
-    target = io.BytesIO()
-    with style():
-        canvas: Any = FigureCanvasSVG(drawing.figure)  # type: ignore[no-untyped-call,unused-ignore]
-        canvas.print_svg(target, metadata={"Date": None})
-    return target.getvalue()
-
-
-def _draw_column(axes: Any, column: ColumnRun) -> None:
-    record = column.run.record
-    assert record.sp is not None
-    assert record.stem is not None
-    hours = record.time / 3600.0
-    count = len(record.outputs)
-    for i in range(count):
-        axes[i].plot(hours, record.sp[:, i], color=INK, drawstyle="steps-post", label="SP")
-        axes[i].plot(hours, record.pv[:, i], color=GREY, linewidth=0.5, alpha=0.6)
-        axes[i].plot(hours, column.run.pv_clean[:, i], color=BLUE, label="PV without noise")
-    for j in range(len(record.valves)):
-        axis = axes[count + j]
-        axis.plot(hours, record.op[:, j], color=GREY, linewidth=0.8, label="OP u")
-        axis.plot(hours, record.stem[:, j], color=ORANGE, drawstyle="steps-post", label="stem χ")
-    axes[0].set_xlim(hours[0], hours[-1])
+def _axis(tag: str) -> str:
+    return f"{tag} ({TANK_UNITS[tag]})"
 
 
 def _choices(study: PlantStudy) -> str:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification import Identification, OutputModel
+from stiction_ros.identification import Identification
 from stiction_ros.pages.frame import framed, text
-from stiction_ros.pages.plot import SCRIPT, Curve, against
+from stiction_ros.pages.plot import SCRIPT, Curve, against, over_time
 from stiction_ros.pages.signals import Units, all_signals
-from stiction_ros.processes import StirredTank
 from stiction_ros.report.page import Cell, card, duration, number, table
 from stiction_ros.report.record.report import evidence_table
 from stiction_ros.report.run.identified import KINDS, process_table, verdict_line
@@ -21,21 +18,6 @@ from stiction_ros.report.run.story import TANK_UNITS
 from stiction_ros.report.shapes import free_run, responses
 from stiction_ros.signals.holds import set_point_moves
 from stiction_ros.texts import finite
-from stiction_studies.drawing import (
-    BLUE,
-    GREY,
-    INK,
-    ORANGE,
-    SKY,
-    VERMILION,
-    Drawing,
-    TimeAxis,
-    data_limits,
-    embedded,
-    legend,
-    panels,
-    style,
-)
 from stiction_studies.examples.comparison import Against, Comparison, ValveComparison
 from stiction_studies.examples.example import Example
 from stiction_studies.examples.one_step import one_step_estimate
@@ -78,7 +60,7 @@ def report_example(
         _errors(comparison),
         "<h2>Response to a step of the stem</h2>",
         responses(values["outputs"], record, units, example.truth),
-        embedded(draw_window(example, found)),
+        "<h2>Measured and estimated time trends</h2>" + trends(example, found),
         all_signals(record, found.stem, units),
         valve_curves(example, found),
         evidence_table(found.valves),
@@ -104,16 +86,36 @@ def comparison_table(comparison: Comparison) -> str:
     return "<h2>True and identified</h2>" + table(head, rows)
 
 
-def draw_window(example: Example, found: Identification) -> Drawing:
-    """Draw the trends around a set-point move."""
-    with style():
-        return Drawing(
-            "window",
-            "Measured and estimated time trends",
-            "A part of the record around a set-point move. The free run is driven by the "
-            "estimated stems alone; the one-step estimate also by the PV measured before.",
-            _trends(example, found, window(example)),
-        )
+def trends(example: Example, found: Identification) -> str:
+    """Return the trends around a set-point move as figures.
+
+    The free run is driven by the estimated stems alone, the one-step estimate also by the PV
+    measured before.
+    """
+    record, part = example.record, window(example)
+    assert record.stem is not None
+    time, units = record.time[part], Units("PV units", "%", _units(example))
+    stems = dict(zip(record.valves, found.stem.T, strict=True))
+    drawn = []
+    for output in found.outputs:
+        i = record.outputs.index(output.name)
+        one_step = one_step_estimate(record, found.stem, output)
+        curves = [
+            Curve("PV, measured", "whole", record.pv[part, i]),
+            Curve("one-step estimate", "pv", one_step[part]),
+            Curve("free run", "free", free_run(output, stems, record.pv[:, i])[part]),
+        ]
+        if record.sp is not None:
+            curves.append(Curve("set-point", "sp", record.sp[part, i], steps=True))
+        drawn.append(over_time(f"{output.name}.", time, curves, units.axis(output.name)))
+    for j, name in enumerate(record.valves):
+        curves = [
+            Curve("OP", "op", record.op[part, j], steps=True),
+            Curve("stem, true", "ink", record.stem[part, j], steps=True),
+            Curve("stem, estimated", "stem", found.stem[part, j], steps=True),
+        ]
+        drawn.append(over_time(f"OP and stem of {name}.", time, curves, "%"))
+    return "".join(drawn)
 
 
 def valve_curves(example: Example, found: Identification) -> str:
@@ -149,87 +151,6 @@ def window(example: Example) -> slice:
     return slice(first, first + width)
 
 
-def _trends(example: Example, found: Identification, part: slice) -> Any:
-    """Return a figure with PV, SP and both estimates, and OP with true and estimated stem."""
-    record = example.record
-    assert record.stem is not None
-    rows = len(record.outputs) + len(record.valves)
-    figure, axes = panels(rows, 0.6 + 2.2 * rows, sharex=True)
-    time = TimeAxis.spanning(record.time[-1])
-    at = time(record.time[part])
-    for row, output in enumerate(found.outputs):
-        _draw_estimates(axes[row, 0], at, example, found, output, part)
-        legend(axes[row, 0])
-    for row, name in enumerate(record.valves, start=len(found.outputs)):
-        j = row - len(found.outputs)
-        axis = axes[row, 0]
-        draw_valve(axis, at, record.op[part, j], record.stem[part, j], found.stem[part, j])
-        axis.set_title(name)
-        legend(axis)
-    axes[-1, 0].set_xlabel(time.label)
-    axes[-1, 0].set_xlim(at[0], at[-1])
-    return figure
-
-
-def _draw_estimates(
-    axis: Any,
-    at: FloatArray,
-    example: Example,
-    found: Identification,
-    output: OutputModel,
-    part: slice,
-) -> None:
-    record = example.record
-    i = record.outputs.index(output.name)
-    measured = record.pv[:, i]
-    stems = {name: found.stem[:, j] for j, name in enumerate(record.valves)}
-    run = free_run(output, stems, measured)[part]
-    one_step = one_step_estimate(record, found.stem, output)[part]
-    axis.plot(at, measured[part], color=SKY, linewidth=3.0, alpha=0.6, label="PV, measured")
-    if record.sp is not None:
-        axis.plot(at, record.sp[part, i], color=INK, drawstyle="steps-post", label="SP")
-    axis.plot(at, one_step, color=BLUE, linewidth=0.8, label="one-step estimate")
-    axis.plot(at, run, color=VERMILION, linewidth=1.1, linestyle=(0, (5, 2)), label="free run")
-    data_limits(axis, [measured[part], run])
-    axis.set_title(output.name)
-    axis.set_ylabel(f"{output.name} ({_units(example).get(output.name, 'PV units')})")
-
-
-def draw_valve(
-    axis: Any,
-    at: FloatArray,
-    op: FloatArray,
-    stem: FloatArray | None,
-    estimate: FloatArray | None,
-) -> None:
-    """Draw OP and the true and estimated stem of one valve, each of shape (N,), %."""
-    drawn = [op]
-    axis.plot(at, op, color=GREY, linewidth=0.9, drawstyle="steps-post", label="OP u")
-    if stem is not None:
-        drawn.append(stem)
-        axis.plot(
-            at,
-            stem,
-            color=ORANGE,
-            linewidth=2.4,
-            alpha=0.85,
-            drawstyle="steps-post",
-            label="stem χ, true",
-        )
-    if estimate is not None:
-        drawn.append(estimate)
-        axis.plot(
-            at,
-            estimate,
-            color=BLUE,
-            linewidth=0.9,
-            drawstyle="steps-post",
-            label="stem χ̂, estimated",
-        )
-    data_limits(axis, drawn)
-    axis.set_ylabel("position (%)")
-
-
 def _card(valve: ValveComparison) -> str:
     kind = KINDS.get(valve.verdict, "open")
     static, dynamic = valve.static_friction, valve.dynamic_friction
@@ -263,10 +184,6 @@ def _errors(comparison: Comparison) -> str:
         '<p class="soft">Step responses are compared by their largest difference, as a share '
         "of the output’s largest true gain.</p>"
     )
-
-
-def _is_tank(example: Example) -> bool:
-    return isinstance(example.truth.process, StirredTank)
 
 
 def _units(example: Example) -> Mapping[str, str]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-from stiction_studies.drawing import Drawing
-
 
 @dataclasses.dataclass(frozen=True)
 class Row:
@@ -31,13 +29,13 @@ class Exhibit:
     Attributes:
         name: of the option that asks for it, such as ``figure2`` or ``tableA.3``.
         title: heading.
-        rows: numbers side by side; a drawing may have none.
-        drawing: None for a table.
+        rows: numbers side by side.
+        figures: HTML; empty for a table.
         remark: what holds for all of it.
     """
 
     name: str
     title: str
     rows: tuple[Row, ...] = ()
-    drawing: Drawing | None = None
+    figures: str = ""
     remark: str = ""

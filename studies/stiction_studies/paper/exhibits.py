@@ -10,10 +10,10 @@ from pathlib import Path
 
 from stiction_ros.errors import InputError, storing
 from stiction_ros.pages.frame import framed, text
+from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.report.page import table
-from stiction_studies.drawing import embedded
 from stiction_studies.paper.exhibit import Exhibit
-from stiction_studies.paper.figures import controllers, diagrams, responses, trends
+from stiction_studies.paper.figures import controllers, responses, trends
 from stiction_studies.paper.sources import Sources
 from stiction_studies.paper.tables import (
     constants,
@@ -30,10 +30,8 @@ PAGE = "paper.html"
 HEAD = ("", "printed", "ours", "remark")
 # Name: what makes its exhibits, in the order of the page.
 MAKERS: dict[str, tuple[Callable[[Sources], Exhibit], ...]] = {
-    "figure1": (diagrams.figure1,),
     "figure2": (responses.figure2,),
     "figure3": (trends.figure3,),
-    "figure4": (diagrams.figure4,),
     "figure5": (responses.figure5,),
     "figure6": tuple(
         functools.partial(controllers.figure6, plant=plant) for plant in ("linear", "tank")
@@ -62,7 +60,7 @@ def chosen(figures: Iterable[int], tables: Iterable[str], everything: bool) -> t
 def draw(
     names: Sequence[str], seed: int, directory: Path, show: Callable[[float, str], None]
 ) -> tuple[Path, tuple[Exhibit, ...]]:
-    """Make exhibits, and write the page, every figure as PNG, and ``paper.json``.
+    """Make exhibits, and write the page and ``paper.json``.
 
     Args:
         names: of :data:`MAKERS`.
@@ -92,16 +90,14 @@ def _write(made: Sequence[Exhibit], directory: Path) -> Path:
     ]
     for exhibit in made:
         parts.append(f"<h2>{text(exhibit.title)}</h2>")
-        if exhibit.drawing is not None:
-            exhibit.drawing.save(directory)
-            parts.append(embedded(exhibit.drawing))
+        parts.append(exhibit.figures)
         if exhibit.rows:
             rows = [(row.what, row.printed, row.ours, row.remark) for row in exhibit.rows]
             parts.append(table(HEAD, rows, texts=4))
         if exhibit.remark:
             parts.append(f'<p class="soft">{text(exhibit.remark)}</p>')
     target = directory / PAGE
-    target.write_text(framed("The paper", parts), encoding="utf-8")
+    target.write_text(framed("The paper", parts, SCRIPT), encoding="utf-8")
     document = [
         {
             "name": exhibit.name,

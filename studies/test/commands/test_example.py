@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from stiction_ros import read
 from stiction_ros.cli.main import main
-from stiction_studies.as_given import read_csv
 from stiction_studies.examples import example1
 
 
@@ -33,7 +33,7 @@ def test_three_files_are_written(written: Path) -> None:
 
 @pytest.mark.trial
 def test_the_record_is_the_example(written: Path) -> None:
-    record, made = read_csv(written / "record.csv"), example1(2).record
+    record, made = read(written / "record.csv"), example1(2).record
     assert np.array_equal(record.op, made.op)
     assert np.array_equal(record.pv, made.pv)
 

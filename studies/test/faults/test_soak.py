@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
 
 import pytest
 
 from stiction_ros.cli.main import main
 from stiction_studies.commands.soak import parameters
-from stiction_studies.faults.soak import Memory, Readings, Soaked, StolenWatch, stolen_seconds
+from stiction_studies.faults.soak import Memory, Readings, Soaked
 
 GOOD = Soaked(
     86_400,
@@ -58,33 +57,6 @@ def test_a_run_too_short_to_compare_says_nothing_of_memory():
         readings.add(k / 8, "plant", 80_000_000)
     readings.add(1.0, "plant", None)
     assert readings.memory() == {}
-
-
-def test_what_is_missed_while_the_host_has_the_processor_is_told():
-    watch = StolenWatch(0.01)
-    for stolen, missed in ((5.0, 0), (5.0, 1), (5.03, 1), (5.03, 3), (5.03, 3), (5.03, 4)):
-        watch.look(stolen, missed)
-    found = watch.found
-    assert found.seconds == pytest.approx(0.03)
-    assert found.largest == pytest.approx(0.03)
-    assert (found.looks, found.long) == (5, 1)
-    assert (found.missed, found.missed_then) == (4, 2)
-
-
-def test_in_lockstep_no_taken_time_is_long():
-    watch = StolenWatch(0.0)
-    for stolen in (5.0, 9.0, 9.0):
-        watch.look(stolen, 0)
-    assert watch.found.long == 0
-
-
-def test_taken_time_is_read_where_the_system_tells(tmp_path):
-    stat = tmp_path / "stat"
-    stat.write_text("cpu  1 2 3 4 5 6 7 250 0 0\ncpu0 1 2 3 4 5 6 7 8 0 0\n")
-    assert stolen_seconds(stat) == pytest.approx(250 / os.sysconf("SC_CLK_TCK"))
-    stat.write_text("cpu 1 2\n")
-    assert stolen_seconds(stat) is None
-    assert stolen_seconds(tmp_path / "none") is None
 
 
 def options(*given: str):

@@ -3,48 +3,39 @@
 from __future__ import annotations
 
 import json
-import types
+import math
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 
 from stiction_ros.report.run.scoring import Phase, Phases, PhaseStatus, Score
 from stiction_studies.pages.opcua_report import (
-    BridgedRun,
     GrantChange,
     Transfer,
     _failure,
     journal_steps,
+    transfers_of,
 )
 
-SECOND = 1_000_000_000
-ASKED = GrantChange(2 * SECOND, "asked", "waits")
-GRANTED = GrantChange(5 * SECOND, "granted", "granted by the mode")
-BACK = GrantChange(8 * SECOND, "idle", "taken back by the mode")
+ASKED = GrantChange(2.0, "asked", "waits")
+GRANTED = GrantChange(5.0, "granted", "granted by the mode")
+BACK = GrantChange(8.0, "idle", "taken back by the mode")
 
 
-def run(*grants: GrantChange, applied: Any = None) -> BridgedRun:
-    log: Any = types.SimpleNamespace(seconds=lambda stamp: stamp / SECOND)
-    values = np.full((12, 1), 50.0) if applied is None else applied
-    return BridgedRun(log, grants, SECOND * np.arange(12), values, ("V1",))
+def test_transfers_are_told_with_the_step_that_the_plant_has_noted() -> None:
+    found = transfers_of([ASKED, GRANTED, BACK], [0.4, 0.3])
+    told = [(one.time, one.to, one.step) for one in found]
+    assert told == [(5.0, "remote", 0.4), (8.0, "plant", 0.3)]
 
 
-def test_transfers_are_told_with_their_step() -> None:
-    applied = np.full((12, 1), 50.0)
-    applied[5:] = 50.4
-    applied[7:] = 60.0  # the controller's own move, before it is taken back
-    applied[9:] = 60.3
-    found = run(ASKED, GRANTED, BACK, applied=applied).transfers()
-    assert [(one.time, one.to) for one in found] == [(5.0, "remote"), (8.0, "plant")]
-    assert found[0].step == pytest.approx(0.4)
-    assert found[1].step == pytest.approx(0.3)
+def test_steps_of_other_transfers_are_not_taken() -> None:
+    (found,) = transfers_of([ASKED, GRANTED], [0.4, 0.3])
+    assert math.isnan(found.step)
 
 
 def test_a_reason_that_changes_is_no_transfer() -> None:
-    waits = GrantChange(SECOND, "idle", "waits: no sample yet")
-    assert run(waits, ASKED).transfers() == []
+    waits = GrantChange(1.0, "idle", "waits: no sample yet")
+    assert transfers_of([waits, ASKED], []) == []
 
 
 def test_the_plants_journal_tells_the_step_to_the_write(tmp_path: Path) -> None:
@@ -85,7 +76,11 @@ SMOOTH = [Transfer(5.0, "remote", "", 0.2), Transfer(8.0, "plant", "", 0.1)]
         (phases_of(1.0, 0.9), SMOOTH, "goes on cycling"),
         (phases_of(1.0, 0.1, "no cycle"), SMOOTH, "no cycle"),
         (phases_of(1.0, 0.1), SMOOTH[:1], "granted and taken back once"),
-        (phases_of(1.0, 0.1), [SMOOTH[0], Transfer(8.0, "plant", "", 3.0)], "stepped by 3.00 %"),
+        (
+            phases_of(1.0, 0.1),
+            [SMOOTH[0], Transfer(8.0, "plant", "", 3.0)],
+            "stepped by 0.20, 3.00 %",
+        ),
     ],
 )
 def test_a_run_is_judged(found: Phases, transfers: list[Transfer], said: str) -> None:

@@ -7,12 +7,12 @@ import pathlib
 
 import numpy as np
 import pytest
+from as_given import read_csv
 from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.identification.problem.input_checks import Evidence, SwapRule, swapped_columns
 from stiction_ros.records.record import Record
-from stiction_studies.as_given import read_csv
 from stiction_studies.examples import FAMILIES, NOISES, PLANTS, example1, example2, healthy_loop
 
 DATA = pathlib.Path(__file__).resolve().parents[4] / "shared" / "data"

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -8,7 +10,7 @@ from loops import first_order, kalman, limits_for, target_at, weights_for
 from stiction_ros.control import ControlDesign, ControlMode, MpcController
 from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.effects import HeStiction
-from stiction_ros.paper.controllers.formulations import PrintedFormulations
+from stiction_ros.paper.controllers.formulations import as_printed
 from stiction_ros.paper.controllers.inversion import PrintedInversionMpc
 from stiction_ros.paper.controllers.weights import PaperTuning, WeightPreset, augmented_weights
 
@@ -51,8 +53,8 @@ def test_the_observer_takes_the_wanted_stem_for_the_stem() -> None:
         weights,
         np.ones(1),
         kalman(1),
-        others=PrintedFormulations(
-            PaperTuning(augmented_weights(WeightPreset.CORRECTED, MODEL, 6))
+        others=functools.partial(
+            as_printed, PaperTuning(augmented_weights(WeightPreset.CORRECTED, MODEL, 6))
         ),
     )
     mpc = MpcController(design, ControlMode.INVERSION, (FRICTION,))

@@ -12,7 +12,6 @@ from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.paper.controllers.embedding import PrintedEmbeddingMpc
-from stiction_ros.paper.controllers.formulations import PrintedFormulations
 from stiction_ros.paper.controllers.weights import (
     WarmStart,
     WeightPreset,
@@ -71,8 +70,7 @@ def test_settings_choose_the_formulation() -> None:
     design = ControlSettings(formulation="printed", warm_start="search", first_move=1.5).design(
         TANK
     )
-    assert isinstance(design.others, PrintedFormulations)
-    tuning = design.others.tuning
-    assert (tuning.warm_start, tuning.first_move) == (WarmStart.SEARCH, 1.5)
     controller = MpcController(design, ControlMode.EMBEDDING, (HeStiction(8.0, 1.0), None))
     assert isinstance(controller._formulation, PrintedEmbeddingMpc)
+    tuning = controller._formulation.tuning
+    assert (tuning.warm_start, tuning.first_move) == (WarmStart.SEARCH, 1.5)

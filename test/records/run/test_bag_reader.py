@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from as_given import open_record
 from bag_making import JOINT_STATE, SECOND, STORE, Bag, joint_state, read_bag
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -13,7 +14,6 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.record_file import CsvColumns
 from stiction_ros.records.bag.messages import read_messages, read_raw
 from stiction_ros.records.run.bag_reader import read_bag_parts
-from stiction_studies.as_given import open_record
 
 
 def closed(bag: Bag) -> Path:

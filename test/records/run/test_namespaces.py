@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from as_given import open_record
 from bag_making import JOINT_STATE as KIND
 from bag_making import SECOND, Bag, joint_state
 
@@ -12,7 +13,6 @@ from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
 from stiction_ros.intake import IntakeOptions, loops
 from stiction_ros.records.run.log import read_run
-from stiction_studies.as_given import open_record
 
 
 def fill(bag: Bag, space: str, samples: int, mode: str) -> None:

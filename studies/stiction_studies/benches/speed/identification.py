@@ -13,12 +13,13 @@ import numpy as np
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, Identification, IdentificationOptions, identify
-from stiction_ros.paper.equation_error import squared_error
+from stiction_ros.paper.equation_error import fit_outputs
 from stiction_ros.paper.grid_search import count_points
 from stiction_ros.paper.methods import identify as identify_as_paper
 from stiction_ros.paper.one_step_result import check_record, friction_limits
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification
+from stiction_ros.paper.smoothed_laws import smooth_law
 from stiction_ros.signals.arx_fit import ArxOrders
 from stiction_studies.benches.speed.row import Row, row
 from stiction_studies.examples import Example, coupled_loop, example1, example2_of_one_round
@@ -321,7 +322,8 @@ def _answer(example: Example, found: Identification, orders: ArxOrders) -> str:
     record = example.record
     friction = np.array([[v.static_friction, v.dynamic_friction] for v in found.valves])
     delays = tuple(tuple(output.delay[tag] for tag in record.valves) for output in found.outputs)
-    error = squared_error(record, friction, delays, orders)
+    stems = smooth_law("he").hard_stems(record.op, friction)
+    error = fit_outputs(record.pv, stems, delays, orders).squared_error
     flat = sorted({delay for line in delays for delay in line})
     told = ", ".join(map(str, flat)) if len(flat) == 1 else str([list(line) for line in delays])
     return f"{found.method}: {_friction(found)}, delay {told}, SE {error:.6g}"

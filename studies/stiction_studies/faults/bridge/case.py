@@ -14,12 +14,13 @@ from stiction_studies.control_system.journal import Written
 from stiction_studies.faults.bridge.bridge_fault import BridgeFault
 from stiction_studies.faults.bridge.bridged_loop import WATCHDOG, BridgedLoop, NotSeenError
 from stiction_studies.faults.judgement.bag_check import check_bag
+from stiction_studies.faults.judgement.judge import wrong_in_logs
+from stiction_studies.faults.judgement.notices import changes_told
 from stiction_studies.faults.observation import BagFound, Shown
 
 SMOOTH = 1.0  # %: what OP may step by at a transfer of control
 SCANS = 3  # of the plant, beside the watchdog's time: it looks once a scan
 TAKING_OVER = 4 * WATCHDOG  # s for which it is waited for
-LONGEST_LINE = 2000  # characters of a line in a log
 
 
 @dataclasses.dataclass(frozen=True)
@@ -240,21 +241,11 @@ def _rest(seen: Seen) -> list[str]:
         found.append(f"the bag cannot be read: {seen.bag.reason}")
     elif seen.bag.missing or not seen.bag.expected:
         found.append(f"{seen.bag.missing} of {seen.bag.expected} messages are not in the bag")
-    for name, log in seen.logs.items():
-        if "Traceback (most recent call last)" in log:
-            found.append(f"{name} wrote a traceback")
-        if any(len(line) > LONGEST_LINE for line in log.splitlines()):
-            found.append(f"{name} wrote a line of more than {LONGEST_LINE} characters")
-    return found
+    return found + wrong_in_logs(seen.logs)
 
 
 def _tell(seen: Seen, path: Path) -> None:
     """Write every change of a status, in seconds after the fault began."""
-    told: dict[str, tuple[str, str]] = {}
-    lines = []
-    for one in seen.statuses:
-        if told.get(one.node) != (one.level, one.text):
-            told[one.node] = one.level, one.text
-            lines.append(f"{one.wall - seen.begun:8.2f} {one.node} {one.level}: {one.text}")
+    lines = changes_told(seen.statuses, seen.begun)
     lines += [f"{wall - seen.begun:8.2f} mode {mode}" for mode, wall in seen.written.modes]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

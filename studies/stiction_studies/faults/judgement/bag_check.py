@@ -7,7 +7,7 @@ from pathlib import Path
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import read_messages, stamp_ns
-from stiction_studies.as_given import open_parts
+from stiction_ros.records.run.bag_reader import read_bag_parts
 from stiction_studies.faults.observation import BagFound, Sampled
 
 COMPARED = ("pv", "op_applied")
@@ -27,7 +27,7 @@ def check_bag(path: Path, heard: Mapping[str, Sequence[Sampled]]) -> BagFound:
         for one in read_messages(path, wanted=lambda topic: topic.name in topics):
             wanted[topics[one.topic]].discard(stamp_ns(one.message))
         missing = sum(len(stamps) for stamps in wanted.values())
-        open_parts(path)
+        read_bag_parts(path)
     except InputError as error:
         return BagFound(expected, expected, str(error))
     return BagFound(expected, missing)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from stiction_studies.faults.fault import Fault
@@ -89,7 +90,7 @@ def judge(fault: Fault, pace: Pace, seen: Observation, allowed: float) -> Outcom
         reasons += missed
         if not fault.forgets:
             reasons += _knowledge(seen)
-    reasons += _logs(seen)
+    reasons += wrong_in_logs(seen.logs)
     bag = _bag(fault, seen)
     reasons += bag
     return Outcome(
@@ -170,9 +171,10 @@ def _changed(before: Known, after: Known) -> list[str]:
     return found
 
 
-def _logs(seen: Observation) -> list[str]:
+def wrong_in_logs(logs: Mapping[str, str]) -> list[str]:
+    """Return what no log of a node may hold."""
     found = []
-    for node, log in seen.logs.items():
+    for node, log in logs.items():
         if "Traceback (most recent call last)" in log:
             found.append(f"{node} wrote a traceback")
         if any(len(line) > LONGEST_LINE for line in log.splitlines()):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Iterable
 
 from stiction_studies.faults.observation import Observation, Shown
 from stiction_studies.faults.terms import LEVELS, Notice
@@ -77,3 +78,14 @@ def look_for(notice: Notice, seen: Observation) -> Noticing:
 def _last_before(statuses: tuple[Shown, ...], node: str, wall: float) -> Shown | None:
     own = [one for one in statuses if one.node == node and one.wall <= wall]
     return own[-1] if own else None
+
+
+def changes_told(statuses: Iterable[Shown], begun: float) -> list[str]:
+    """Return a line for every change of a status, in s after the fault ``begun``."""
+    told: dict[str, tuple[str, str]] = {}
+    lines = []
+    for one in statuses:
+        if told.get(one.node) != (one.level, one.text):
+            told[one.node] = one.level, one.text
+            lines.append(f"{one.wall - begun:8.2f} {one.node} {one.level}: {one.text}")
+    return lines

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 from stiction_studies.examples.control_study import COLUMNS, StudyOptions, run_trial
-from stiction_studies.pages.control_report import PLANT_TITLES, PlantStudy, draw_study
+from stiction_studies.pages.control_report import PLANT_TITLES, PlantStudy, figures_of
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.sources import Sources
 
@@ -40,9 +38,9 @@ def figure6(sources: Sources, plant: str) -> Exhibit:
         if column.sticky:
             work += f", {moved.moves:.0f} moves"
         rows.append(Row(column.title, claim, f"{outputs}; {work}", remark))
-    drawing = dataclasses.replace(draw_study(study), title=f"Figure 6 on {PLANT_TITLES[plant]}")
     remark = (
         "All controllers know the true friction. IAE in units of PV × min; offset, IAE and cycle "
         "of the noise-free outputs."
     )
-    return Exhibit("figure6", drawing.title, tuple(rows), drawing, remark)
+    title = f"Figure 6 on {PLANT_TITLES[plant]}"
+    return Exhibit("figure6", title, tuple(rows), figures_of(study), remark)

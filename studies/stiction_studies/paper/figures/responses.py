@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification
+from stiction_ros.pages.plot import Curve, over_time
 from stiction_ros.report.shapes import step_response, true_response
-from stiction_studies.drawing import BLUE, GREEN, GREY, ORANGE, Drawing, panels, style
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import printed_example
 from stiction_studies.paper.sources import Sources
@@ -25,7 +24,7 @@ from stiction_studies.paper.tables.printed_numbers import (
 )
 
 SAMPLES = {1: 100, 2: 120}
-METHODS = (("nlp", "paper's NLP, re-made", BLUE), ("exact", "exact search", GREEN))
+METHODS = (("nlp", "paper's NLP, re-made", "pv"), ("exact", "exact search", "stem"))
 
 
 def figure2(sources: Sources) -> Exhibit:
@@ -36,13 +35,6 @@ def figure2(sources: Sources) -> Exhibit:
         "V1",
         count,
     )
-    with style():
-        figure, axes = panels(1, 4.0)
-        _draw(axes[0, 0], sources, 1, (0, 0), [("θ̂ as printed", printed)])
-        axes[0, 0].set_title("V1 → PV1")
-        axes[0, 0].set_xlabel("time since the step (s)")
-        axes[0, 0].set_ylabel("PV1 per %")
-        axes[0, 0].legend(loc="lower right")
     actual = true_response(sources.example(1).truth, 0, 0, 600)[-1]
     rows = [*friction_rows(sources, 1)]
     rows.append(
@@ -53,45 +45,29 @@ def figure2(sources: Sources) -> Exhibit:
             f"(17) has 1, (18) as rounded {actual:.3f}",
         )
     )
-    drawing = Drawing(
-        "figure2",
-        "Figure 2: Example 1, unit step response of the actual and the identified process",
-        f"Seed {sources.seed}. The printed coefficients are drawn with their delay of 5.",
-        figure,
-    )
-    return Exhibit("figure2", drawing.title, tuple(rows), drawing)
+    title = "Figure 2: Example 1, unit step response of the actual and the identified process"
+    remark = f"Seed {sources.seed}. The printed coefficients are drawn with their delay of 5."
+    drawn = _drawn(sources, 1, (0, 0), ("θ̂ as printed", printed))
+    return Exhibit("figure2", title, tuple(rows), drawn, remark)
 
 
 def figure5(sources: Sources) -> Exhibit:
     """Return Example 2: the four channels of (A.3) and what was identified of them."""
-    example = sources.example(2)
-    with style():
-        figure, axes = panels(2, 6.4, 2, sharex=True)
-        for i, output in enumerate(example.record.outputs):
-            for j, valve in enumerate(example.record.valves):
-                count = SAMPLES[2]
-                shown = [
-                    ("Table 2, mended", responses(TABLE_2_MENDED[i][j], TABLE_2_POLES[i], count))
-                ]
-                if i == j:
-                    shown = [
-                        ("Table 2, as printed", responses(TABLE_2[i][j], TABLE_2_POLES[i], count))
-                    ]
-                axis = axes[i, j]
-                _draw(axis, sources, 2, (i, j), shown)
-                axis.set_title(f"{valve} → {output}")
-                axis.set_xlabel("time since the step (min)" if i == 1 else "")
-        axes[0, 0].legend(loc="lower right", fontsize=8)
-        axes[0, 1].legend(loc="upper right", fontsize=8)
-    drawing = Drawing(
-        "figure5",
-        "Figure 5: Example 2, unit step response of the actual and the identified process",
+    record, drawn = sources.example(2).record, []
+    for i in range(len(record.outputs)):
+        for j in range(len(record.valves)):
+            name, entries = "Table 2, mended", TABLE_2_MENDED
+            if i == j:
+                name, entries = "Table 2, as printed", TABLE_2
+            printed = responses(entries[i][j], TABLE_2_POLES[i], SAMPLES[2])
+            drawn.append(_drawn(sources, 2, (i, j), (name, printed)))
+    title = "Figure 5: Example 2, unit step response of the actual and the identified process"
+    remark = (
         f"Seed {sources.seed}, 620 samples, orders (5, 5). V1 → T and V2 → C are drawn with the "
         "interchanged numerators of Table 2 put right. V2 → C is nought but for rounding: mind "
-        "its scale.",
-        figure,
+        "its scale."
     )
-    return Exhibit("figure5", drawing.title, friction_rows(sources, 2), drawing)
+    return Exhibit("figure5", title, friction_rows(sources, 2), "".join(drawn), remark)
 
 
 def friction_rows(sources: Sources, number: int) -> tuple[Row, ...]:
@@ -131,24 +107,23 @@ def _each(sources: Sources, number: int, say: Any) -> str:
     )
 
 
-def _draw(
-    axis: Any,
-    sources: Sources,
-    number: int,
-    channel: tuple[int, int],
-    printed: Sequence[tuple[str, FloatArray]],
-) -> None:
-    i, j = channel
+def _drawn(
+    sources: Sources, number: int, channel: tuple[int, int], printed: tuple[str, FloatArray]
+) -> str:
+    """Return the figure of one channel: actual, printed, and as each method found it."""
+    (i, j), (label, values) = channel, printed
     example, count = sources.example(number), SAMPLES[number]
-    valve = example.record.valves[j]
-    at = np.arange(count)
-    actual = true_response(example.truth, i, j, count)
-    axis.plot(at, actual, color=ORANGE, linewidth=3.2, alpha=0.7, label="actual")
-    for label, values in printed:
-        axis.plot(at, values, color=GREY, linestyle=(0, (5, 2)), label=label)
-    for method, label, colour in METHODS:
+    record = example.record
+    curves = [
+        Curve("actual", "whole", true_response(example.truth, i, j, count)),
+        Curve(label, "sp", values),
+    ]
+    for method, name, kind in METHODS:
         output = sources.found(number, method).identification.outputs[i].to_dict()
-        axis.plot(at, step_response(output, valve, count), color=colour, label=label)
+        curves.append(Curve(name, kind, step_response(output, record.valves[j], count)))
+    time = record.sample_time * np.arange(float(count))
+    title = f"{record.valves[j]} → {record.outputs[i]}, from the step on."
+    return over_time(title, time, curves, f"{record.outputs[i]} per %")
 
 
 def printed_gain() -> float:

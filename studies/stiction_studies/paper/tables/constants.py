@@ -53,4 +53,4 @@ def table_a3(sources: Sources) -> Exhibit:
     ]
     remark = "The table is in minutes, loop models are in seconds: sample_time 60 is the paper's 1."
     title = "Table A.3: variables and parameters of the stirred tank"
-    return Exhibit("tableA.3", title, tuple(rows), None, remark)
+    return Exhibit("tableA.3", title, tuple(rows), remark=remark)

@@ -46,7 +46,7 @@ def table_of_retuning(sources: Sources) -> Exhibit:
         "Means of the seeds; amplitude at the period of SU's cycle, noise-free outputs, "
         f"a set-point move every {HOLD} min. The remark gives that period for each seed."
     )
-    return Exhibit("retuning", "Retuning does not remove the cycle", tuple(rows), None, remark)
+    return Exhibit("retuning", "Retuning does not remove the cycle", tuple(rows), remark=remark)
 
 
 def table_of_ablation(sources: Sources) -> Exhibit:
@@ -72,7 +72,7 @@ def table_of_ablation(sources: Sources) -> Exhibit:
         "SE as printed on (A.3), set-points of the scenario, means of the seeds. None leaves "
         "OP where it is. Plain is (19a) with the weights of SU."
     )
-    return Exhibit("ablation", "Warm start and cost one by one", tuple(rows), None, remark)
+    return Exhibit("ablation", "Warm start and cost one by one", tuple(rows), remark=remark)
 
 
 def table_of_identified(sources: Sources) -> Exhibit:
@@ -100,7 +100,7 @@ def table_of_identified(sources: Sources) -> Exhibit:
         "The record is SU's run on the same plant with the same seed; nlp at the paper's orders, M "
         "and Δu. A healthy valve that is found to stick a little is taken to stick."
     )
-    return Exhibit("identified", "Figure 6 with identified friction", tuple(rows), None, remark)
+    return Exhibit("identified", "Figure 6 with identified friction", tuple(rows), remark=remark)
 
 
 def _identified(seed: int, plant: str) -> Identification:

@@ -36,7 +36,7 @@ def table_of_laws(sources: Sources) -> Exhibit:
         f"delays {DELAYS[0]} and {DELAYS[1]}, M = 7, grid of {STEP:g} %. XCH's reconstruction has "
         "Kano's signature; Choudhury's law has no smoothed form."
     )
-    return Exhibit("laws", "Other smoothed laws", tuple(rows), None, remark)
+    return Exhibit("laws", "Other smoothed laws", tuple(rows), remark=remark)
 
 
 def _identified(seed: int, law: str, method: str) -> Row:

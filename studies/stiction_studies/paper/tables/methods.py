@@ -56,7 +56,7 @@ def table_of_times(sources: Sources) -> Exhibit:
         f"One record, seed {sources.seed}, {platform.machine()}, one process. Compare the ratios: "
         "the printed seconds are of another machine and of Python 3.6 with CasADi 3.4."
     )
-    return Exhibit("times", "Computing times", tuple(rows), None, remark)
+    return Exhibit("times", "Computing times", tuple(rows), remark=remark)
 
 
 def table_of_success(sources: Sources) -> Exhibit:
@@ -81,4 +81,4 @@ def table_of_success(sources: Sources) -> Exhibit:
         f"Right: every f_S and f_D within {RIGHT} % of the truth, at the paper's orders, M, T, "
         f"steps and Δu. The true friction is a node of both grids. Stored from: {commands}."
     )
-    return Exhibit("success", "How often a method is right", tuple(rows), None, remark)
+    return Exhibit("success", "How often a method is right", tuple(rows), remark=remark)

@@ -53,7 +53,7 @@ def table1(sources: Sources) -> Exhibit:
         "Ours are those of (A.3), from which everything here is built: the table repeats it with "
         "too few digits to be used."
     )
-    return Exhibit("table1", "Table 1: G(z) of the stirred tank", tuple(rows), None, remark)
+    return Exhibit("table1", "Table 1: G(z) of the stirred tank", tuple(rows), remark=remark)
 
 
 def table2(sources: Sources) -> Exhibit:
@@ -86,7 +86,7 @@ def table2(sources: Sources) -> Exhibit:
         f"Seed {sources.seed}, orders (5, 5). Single coefficients of an ARX model over noisy PV "
         "are not comparable between two records; gains are."
     )
-    return Exhibit("table2", "Table 2: identified ARX model", tuple(rows), None, remark)
+    return Exhibit("table2", "Table 2: identified ARX model", tuple(rows), remark=remark)
 
 
 def _listed(values: Sequence[float] | np.ndarray) -> str:

@@ -12,7 +12,7 @@ from stiction_ros.paper.programme.friction_programme import FrictionProgramme
 from stiction_ros.paper.programme.nlp import WIDTH
 from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.reduced_programme import ReducedProgramme
-from stiction_ros.paper.smoothed_stems import final_smoothing, smoothed_stems
+from stiction_ros.paper.smoothed_laws import final_smoothing, smooth_law
 from stiction_studies.examples import Example
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import printed_example
@@ -36,7 +36,7 @@ def table_of_wells(sources: Sources) -> Exhibit:
         f"Seed {sources.seed}, true delays, {DIRECTIONS} starts round the truth of V1 for each "
         f"distance, coefficients fitted at the start. Right: within {RIGHT} %."
     )
-    return Exhibit("wells", "The well round the truth", tuple(rows), None, remark)
+    return Exhibit("wells", "The well round the truth", tuple(rows), remark=remark)
 
 
 class _Well:
@@ -90,7 +90,7 @@ class _Well:
                 friction = self.truth.copy()
                 friction[0] = point
                 taus = np.append(smoothing, np.full(len(friction) - 1, SMOOTHINGS[-1]))
-                stems = smoothed_stems(record.op, friction, taus)
+                stems = smooth_law("he").stems(record.op, friction, taus)
                 found = fit_outputs(record.pv, stems, self.delays, self.orders)
                 values.append(found.squared_error)
             static, dynamic = points[int(np.argmin(values))]
