@@ -91,6 +91,7 @@ class MpcController:
         self._dv: FloatArray = np.zeros(design.model.e.shape[1])
         self._started = False
         self._decided: tuple[FloatArray, Plan | None] | None = None  # applied in this sample
+        self._ways: list[list[float]] = [[] for _ in range(m)]  # OP of slips that are under way
 
     @property
     def frictions(self) -> tuple[Behaviour | None, ...]:
@@ -115,6 +116,7 @@ class MpcController:
     def forget(self) -> None:
         """Forget the past; the next measurement starts from rest, frictions stay known."""
         self._started, self._decided = False, None
+        self._ways = [[] for _ in self._ways]
         self._strategies = self._new_strategies()  # no plan of the past is followed on
         self._passage = Passage(self.design.longest_wait)
         if self._check is not None:
@@ -213,7 +215,7 @@ class MpcController:
             self.observer.state, target, self.stem, applied, self.valves.forms, trouble
         )
         proposal = self._strategies.choose(situation)
-        op = self._valid(proposal.op, applied)
+        op = self._valid(self._on_its_way(proposal, applied), applied)
         cut: list[int] = []
         if proposal.status is not StepStatus.FALLBACK:  # which has a rate of its own
             wanted, rate = np.clip(op, applied - reach, applied + reach), self.design.limits.move
@@ -273,6 +275,7 @@ class MpcController:
             belief.raise_static(stayed.static_friction, stayed.stem)
             self.stem = self.stem.copy()
             self.stem[stayed.valve] = stayed.stem
+            self._ways[stayed.valve] = []
             self.observer = stayed.observer
             name = _name(self.design.valve_names, stayed.valve, "valve")
             self.raised = f"{name} stayed where it should have moved: f_S is at least "
@@ -291,6 +294,14 @@ class MpcController:
         rows = np.vstack([rows, np.repeat(rows[-1:], max(horizon + 1 - len(rows), 0), axis=0)])
         return self._target.follow(rows, disturbance, self._dv)
 
+    def _on_its_way(self, proposal: Proposal, applied: FloatArray) -> FloatArray:
+        """Return the OP (m,), %, of this sample; a slip that takes several ends as it began."""
+        op = np.array(proposal.op)
+        for j, belief in self.valves.sticky if proposal.plan is not None else ():
+            way = self._ways[j] or belief.form.way(float(applied[j]), belief.stem, float(op[j]))
+            op[j], *self._ways[j] = way
+        return op
+
     def _valid(self, op: FloatArray, otherwise: FloatArray) -> FloatArray:
         """Return ``op`` within the limits, with ``otherwise`` where it is no number."""
         limits = self.design.limits.stem
@@ -299,6 +310,8 @@ class MpcController:
 
     def _decide(self, op: FloatArray, plan: Plan | None) -> None:
         """Note what is to be applied in this sample, and where that should bring the stems."""
+        if plan is None:
+            self._ways = [[] for _ in self._ways]
         if not self._started:
             return
         self._decided = op, plan
@@ -311,6 +324,8 @@ class MpcController:
             return
         decided, plan = self._decided
         self._decided = None
+        if not np.array_equal(applied, decided):
+            self._ways = [[] for _ in self._ways]
         check = self._check
         if check is not None:
             if not known:

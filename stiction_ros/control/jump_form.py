@@ -13,8 +13,7 @@ def jump_form(law: Behaviour) -> JumpForm:
     """Return the jump form of a law of stiction.
 
     Raises:
-        InputError: the law has none; the smoothed laws move a little at any OP, and by
-            Choudhury's law a single step of OP never moves the stem.
+        InputError: the law has none; the smoothed laws move a little at any OP.
     """
     form = law.jump_form() if isinstance(law, Stiction) else None
     if form is None:

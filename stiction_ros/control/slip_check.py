@@ -107,7 +107,8 @@ class SlipCheck:
 
     def begin(self, valve: int, observer: Observer, belief: ValveBelief, op: float) -> None:
         """Begin when ``op``, %, is about to move ``valve`` from where ``belief`` has it."""
-        if not self._rivals[valve] and belief.sure and belief.form.slips(belief.stem, op):
+        slips = belief.form.slips(belief.stem, op) and belief.expected(op) != belief.stem
+        if not self._rivals[valve] and belief.sure and slips:
             self._rivals[valve] = [_Rival(observer, belief, op, stuck) for stuck in (False, True)]
 
     def predict(self, op: FloatArray, stems: FloatArray, dv: FloatArray) -> None:

@@ -177,3 +177,25 @@ def he_stems(
             stem[g] = moved
             stems[k, g] = moved
     return stems
+
+
+@compiled
+def semi_physical_stems(
+    static: FloatArray,
+    dynamic: FloatArray,
+    overshoot: FloatArray,
+    u: FloatArray,
+    start: FloatArray,
+) -> FloatArray:
+    """Return stems, shape (N, G), of valves (f_S, f_D, K) that rest at ``start``, (G,)."""
+    count, size = len(u), len(static)
+    stems = np.empty((count, size))
+    stem = start.copy()
+    for k in range(count):
+        for g in range(size):
+            error = u[k] - stem[g]
+            if abs(error) > static[g]:
+                friction = dynamic[g] if error > 0.0 else -dynamic[g]
+                stem[g] += overshoot[g] * (error - friction)
+            stems[k, g] = stem[g]
+    return stems

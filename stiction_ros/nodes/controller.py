@@ -241,6 +241,8 @@ class ControllerNode(ControllerInputs):
             self._mode.publish(String(data=change.mode.value))
             self.log.info(f"sample {change.sample}: {change.mode}, {change.reason}")
             told = [("mode", change.mode.value), ("model", change.model), ("reason", change.reason)]
+            laws = zip(self.model.valve_names, self.live.frictions, strict=True)
+            told += [(f"{name}.law", str(one.law)) for name, one in laws if one is not None]
             self.report([("mode", change.mode.value, [*told, *self.live.known_friction()])])
             if change is self.live.tested:
                 self._tell_test()

@@ -61,7 +61,7 @@ class EstimatorNode(ManagedNode):
         self._token = ""
         self._fits = self._failed = 0
         self._said = "no fit yet"
-        self._worker = FitWorker()
+        self._worker = FitWorker(self.settings.methods)
         self._done = self.create_guard_condition(self._collect)
         self._stiction = self.outlet(JointState, "stiction", SIGNAL_QOS, ("controller",))
         self._model = self.outlet(String, "loop_model", LATCHED_QOS, ("controller",))
@@ -196,7 +196,7 @@ class EstimatorNode(ManagedNode):
             self.stamp, self._sample = found.stamp, found.sample + 1
             record = self.live.add(found.sample, found.op, found.pv)
             if record is not None:
-                future = self._queue(fit, record, self.live.settings.options())
+                future = self._queue(fit, record, self.live.options())
                 self._pending.append((found.sample, future))
             look = self.monitoring.add(found.sample, found.op, found.pv)
             if look is not None:

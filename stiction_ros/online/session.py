@@ -263,7 +263,7 @@ class _Loop:
 
     def _fit(self, estimator: LiveEstimator, record: Record) -> None:
         try:
-            found = fit(record, estimator.settings.options())
+            found = fit(record, estimator.options())
         except InputError:
             estimator.drop(self._sample)
             return  # a window that cannot be used changes nothing, as in the node

@@ -397,19 +397,13 @@ def test_a_loop_is_run_again_by_the_law_that_was_identified(law: str) -> None:
     assert again is not None
     assert again.iae_per_hour == pytest.approx(now.iae_per_hour, rel=0.05)
     assert again.moves_per_hour == pytest.approx(now.moves_per_hour, rel=0.05)
-    if law == "choudhury":
-        with pytest.raises(InputError, match="no jump form"):
-            EmbeddingDesign.of(loop)
-    else:
-        assert type(EmbeddingDesign.of(loop).friction) is type(friction)
+    assert type(EmbeddingDesign.of(loop).friction) is type(friction)
 
 
 @pytest.mark.trial
 @pytest.mark.parametrize("law", ["kano", "choudhury"])
-def test_the_law_of_a_model_is_embedded_where_an_op_can_be_planned(law: str) -> None:
-    embedding = gain_of_model(of_law(law), samples=300).option(What.EMBEDDING)
-    assert (embedding.measures is None) == (law == "choudhury")
-    assert ("no jump form" in embedding.note) == (law == "choudhury")
+def test_the_law_of_a_model_is_embedded(law: str) -> None:
+    assert gain_of_model(of_law(law), samples=300).option(What.EMBEDDING).measures is not None
 
 
 def test_a_tuning_that_makes_the_cycle_wider_does_not_help() -> None:

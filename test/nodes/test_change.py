@@ -18,6 +18,11 @@ from stiction_ros.online.session import LiveRun, Scenario, run_live
 QUICK = {"fit_first": 400, "fit_every": 100, "fit_latency": 5}
 TANK = {"fit_first": 310, "fit_every": 62, "fit_latency": 5}
 GROWN = "[{time: 540.0, valve: V1, effects: [{effect: stiction, law: he, f_s: 7.5, f_d: 2.0}]}]"
+LAWS = {  # figures of f_S = 5 %, f_D = 2 %
+    "kano": "s: 7.0, j: 3.0",
+    "choudhury": "s: 7.0, j: 3.0",
+    "xch": "f_s: 5.0, f_d: 2.0",
+}
 SERVICED = "[{time: 540.0, valve: V1, effects: []}]"
 
 # A controller that moves often: a change shows after few samples.
@@ -34,6 +39,9 @@ CASES = {
     "serviced": ("siso", QUICK, 500, SERVICED, 920, ["embedding", "unaware"]),
     "grown": ("siso", QUICK, 500, GROWN, 720, ["embedding", "embedding", "embedding"]),
 }
+for law, figures in LAWS.items():
+    change = f"{{time: 0.0, valve: V1, effects: [{{effect: stiction, law: {law}, {figures}}}]}}"
+    CASES[law] = ("siso", QUICK, 500, f"[{change}]", 520, ["embedding"])
 
 
 def run_graph(name: str) -> Graph:
@@ -50,7 +58,7 @@ def run_graph(name: str) -> Graph:
         values["controller"].update(
             {key: list(v) if isinstance(v, tuple) else v for key, v in OFTEN.items()}
         )
-    values["estimator"].update(schedule, window=window)
+    values["estimator"].update(schedule, window=window, law=name if name in LAWS else "he")
     if scenario == "siso":
         values["estimator"].update(delay_low=5, delay_high=5)
     graph = Graph()
@@ -75,7 +83,8 @@ def run_core(name: str) -> LiveRun:
     found = Scenario.load(find_config(f"{scenario}.scenario.yaml"))
     estimator = dataclasses.replace(found.estimator, window=window, **schedule)
     if scenario == "siso":
-        estimator = dataclasses.replace(estimator, delay_low=5, delay_high=5)
+        law = name if name in LAWS else "he"
+        estimator = dataclasses.replace(estimator, delay_low=5, delay_high=5, law=law)
     controller = dataclasses.replace(found.controller, horizon=30, **schedule)
     if changes:
         controller = dataclasses.replace(controller, **OFTEN)
@@ -131,6 +140,11 @@ def check(name: str, graph: Graph, twin: LiveRun) -> None:
     if name == "tank":
         assert [len(valve.effects) for valve in model.valves] == [1, 0]
         assert "change" not in entry
+    elif name in LAWS:
+        (friction,) = model.valves[0].effects
+        assert friction.law == name
+        own = [f"V1.{name}.{entry.key}" for entry in friction.parameters()]
+        assert graph.seen["stiction"][-1].name == ["V1.f_s", "V1.f_d", *own]
     elif name == "serviced":
         assert model.valves[0].effects == ()
         assert entry["change"] == "serviced"

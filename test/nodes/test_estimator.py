@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import pytest
@@ -29,6 +29,9 @@ class Idle:
     """A worker that has nothing to compile, as no window here is ever full."""
 
     compiled = True
+
+    def __init__(self, methods: Sequence[str]) -> None:
+        self.methods = methods
 
     def close(self) -> None:
         return

@@ -6,7 +6,7 @@ import dataclasses
 import enum
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,9 @@ class NoWorker:
     """Stands for the process that fits, which takes seconds until it is ready."""
 
     compiled = True
+
+    def __init__(self, methods: Sequence[str]) -> None:
+        self.methods = methods
 
     def close(self) -> None:
         pass

@@ -14,6 +14,7 @@ from bag_making import JOINT_STATE, SECOND, Bag, joint_state
 
 from stiction_ros import __version__
 from stiction_ros.config_files import find_config
+from stiction_ros.effects import Stiction
 from stiction_ros.online.controller.live import ModeChange
 from stiction_ros.online.estimator.live import FitUpdate
 from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
@@ -27,18 +28,24 @@ SCHEDULE: dict[str, Any] = {"fit_first": 400, "fit_every": 50, "fit_latency": 5}
 WINDOW = 300
 
 
-def settings_of_run() -> tuple[Scenario, EstimatorNodeSettings, ControllerNodeSettings]:
-    """Return the scenario and the settings of its two nodes."""
+def settings_of_run(
+    law: Stiction | None = None, window: int = WINDOW
+) -> tuple[Scenario, EstimatorNodeSettings, ControllerNodeSettings]:
+    """Return the scenario and the settings of its two nodes; ``law`` in place of the valve's."""
     scenario = Scenario.load(find_config("siso.scenario.yaml"))
     estimator = EstimatorNodeSettings(
         **SCHEDULE,
         loop="example1",
-        window=WINDOW,
+        window=window,
         output_order=3,
         input_order=3,
         delay_low=5,
         delay_high=5,
+        law="he" if law is None else str(law.law),
     )
+    if law is not None:
+        plant = scenario.plant.with_valve_effects({"V1": [law]})
+        scenario = dataclasses.replace(scenario, plant=plant)
     given = dict(scenario.nodes["controller"]) | SCHEDULE | {"horizon": 30, "wait_for": ()}
     given |= {key: tuple(value) for key, value in given.items() if isinstance(value, list)}
     controller = ControllerNodeSettings(**given)
@@ -46,9 +53,9 @@ def settings_of_run() -> tuple[Scenario, EstimatorNodeSettings, ControllerNodeSe
     return scenario, estimator, controller
 
 
-def write_run(directory: Path) -> LiveRun:
-    """Run the loop and write its bag."""
-    scenario, estimator, controller = settings_of_run()
+def write_run(directory: Path, law: Stiction | None = None, window: int = WINDOW) -> LiveRun:
+    """Run the loop and write its bag; ``law`` in place of the valve's."""
+    scenario, estimator, controller = settings_of_run(law, window)
     run = run_live(scenario, samples=SAMPLES, seed=4)
     bag = Bag(BagWriter(directory))
     _config(bag, "/estimator", estimator)
@@ -87,9 +94,8 @@ def _mode(bag: Bag, stamp: int, change: ModeChange, run: LiveRun) -> None:
     last = next((f for f in reversed(run.fits) if f.end < change.sample and f.loop_model), None)
     if last is not None:
         for name, friction in last.trusted.items():
-            behaviour = friction.behaviour()
-            values[f"{name}.f_s"] = str(behaviour.static_friction)
-            values[f"{name}.f_d"] = str(behaviour.dynamic_friction)
+            figures = friction.behaviour().figures()
+            values |= {f"{name}.{key}": str(value) for key, value in figures.items()}
     bag.diagnostics(stamp, "controller: mode", values)
 
 
@@ -98,10 +104,7 @@ def _fit(bag: Bag, stamp: int, update: FitUpdate, token: str) -> str:
         valid_from = stamp + SCHEDULE["fit_latency"] * SECOND
         token = str(valid_from)
         bag.text("/loop_model", update.loop_model.to_yaml(valid_from=valid_from), stamp)
-    rows = {}
-    for valve in update.identification.valves:
-        rows[f"{valve.name}.f_s"] = (valve.static_friction, *valve.static_interval)
-        rows[f"{valve.name}.f_d"] = (valve.dynamic_friction, *valve.dynamic_interval)
+    rows = update.identification.rows
     columns = list(zip(*rows.values(), strict=True))
     data = joint_state(stamp, list(rows), *columns, frame=token)
     bag.put("/stiction", JOINT_STATE, data, stamp, Qos(depth=100))
@@ -110,7 +113,7 @@ def _fit(bag: Bag, stamp: int, update: FitUpdate, token: str) -> str:
         "identification": json_text(update.identification.to_dict(), indent=None),
     }
     for name, friction in update.trusted.items():
-        values[f"{name}.trusted_f_s"] = str(friction.static_friction)
-        values[f"{name}.trusted_f_d"] = str(friction.dynamic_friction)
+        figures = friction.figures()
+        values |= {f"{name}.trusted_{key}": str(value) for key, value in figures.items()}
     bag.diagnostics(stamp, "estimator: fit", values)
     return token

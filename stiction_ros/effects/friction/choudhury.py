@@ -10,7 +10,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray, Memory, Start, starts
 from stiction_ros.effects.friction.moving_rules import SlopeRules
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
-from stiction_ros.effects.friction.stiction import Switching
+from stiction_ros.effects.friction.stiction import JumpForm, Switching
 
 MOVING = -1.0  # a threshold that every |u − x_ss| exceeds
 
@@ -53,6 +53,14 @@ class ChoudhuryStiction(SlipJumpPair):
 
     def rest(self, value: float) -> Memory:
         return (value, value, 0.0, value, self.static_friction, self.static_friction)
+
+    def jump_form(self) -> JumpForm:
+        """Return the moves that the valve can make when OP rests before and after them.
+
+        OP must go the same way twice; its rest then leaves the slip condition at f_S on both
+        sides, and the return to the stem does not count as a turn.
+        """
+        return JumpForm(self, self.static_friction, self.dynamic_friction, strokes=2)
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
         assert isinstance(memory, tuple)

@@ -93,10 +93,12 @@ class SlipJumpPair(Stiction):
         _all_known(cls)
         return cls(static_friction + dynamic_friction, static_friction - dynamic_friction)
 
-    def with_static_friction(self, static_friction: float) -> Self:
-        """Return the law with another f_S, %, f_D and all else kept."""
-        dynamic = self.dynamic_friction
-        band, jump = static_friction + dynamic, static_friction - dynamic
+    def figures(self) -> dict[str, float]:
+        both = {"f_s": self.static_friction, "f_d": self.dynamic_friction}
+        return both | super().figures()
+
+    def with_frictions(self, static_friction: float, dynamic_friction: float) -> Self:
+        band, jump = static_friction + dynamic_friction, static_friction - dynamic_friction
         return dataclasses.replace(self, stick_band=band, jump=jump)
 
     @classmethod

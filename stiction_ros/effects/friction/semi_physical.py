@@ -66,13 +66,11 @@ class SemiPhysicalStiction(FrictionPair):
     def simulate_grid(
         cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
+        from stiction_ros.effects.grid_kernels import semi_physical_stems  # compiled
+
         static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
-        overshoot = grid[:, 2] if grid.shape[1] > 2 else np.full(len(grid), 1.99)
-        stem = np.broadcast_to(np.asarray(start, dtype=float), static.shape).copy()
-        out = np.empty((len(values), len(static)))
-        for k, value in enumerate(values.tolist()):
-            error = value - stem
-            moved = stem + overshoot * (error - np.copysign(dynamic, error))
-            np.copyto(stem, moved, where=np.abs(error) > static)
-            out[k] = stem
-        return out
+        overshoot = grid[:, 2].copy() if grid.shape[1] > 2 else np.full(len(grid), 1.99)
+        starts = np.broadcast_to(np.asarray(start, dtype=float), static.shape).copy()
+        return semi_physical_stems(
+            static, dynamic, overshoot, np.asarray(values, dtype=float), starts
+        )

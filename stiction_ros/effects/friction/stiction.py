@@ -43,12 +43,14 @@ class JumpForm:
         law: the behaviour it was taken from.
         static_friction, dynamic_friction: f_S and f_D, %.
         overshoot: K, above 0.
+        strokes: samples in which OP must go the same way until the stem slips.
     """
 
     law: Stiction
     static_friction: float
     dynamic_friction: float
     overshoot: float = 1.0
+    strokes: int = 1
 
     @property
     def least(self) -> float:
@@ -75,9 +77,27 @@ class JumpForm:
         """Return whether ``op`` moves a stem that rests at ``stem``."""
         return abs(op - stem) > self.static_friction
 
+    def way(self, applied: float, stem: float, op: float) -> list[float]:
+        """Return OP, %, of the samples by which a resting stem slips as ``op`` means it to.
+
+        Where one stroke is not enough, OP goes there in equal strokes and rests a sample behind,
+        as the stem must come to rest before OP turns.
+
+        Args:
+            applied: OP in force, %.
+            stem: where the stem rests, %.
+            op: where a slip ends, or anything that makes none, %.
+        """
+        if self.strokes == 1 or not self.slips(stem, op):
+            return [op]
+        turned = (op - applied) * (op - stem) <= 0.0
+        begin = stem if turned else applied
+        strokes = np.linspace(begin, op, self.strokes + 1)[0 if turned else 1 :]
+        return [*strokes.tolist(), op]
+
     def raised(self, static_friction: float) -> JumpForm:
         """Return the form of the same law with a larger f_S, other parameters kept."""
-        form = self.law.with_static_friction(static_friction).jump_form()
+        form = self.law.with_frictions(static_friction, self.dynamic_friction).jump_form()
         assert form is not None
         return form
 
@@ -137,6 +157,11 @@ class Stiction(Behaviour):
         """
         return None
 
-    def with_static_friction(self, static_friction: float) -> Self:
-        """Return the law with another f_S, %, f_D and all else kept."""
-        return dataclasses.replace(self, static_friction=static_friction)  # type: ignore[call-arg]
+    def figures(self) -> dict[str, float]:
+        """Return its parameters by their keys, f_S and f_D among them."""
+        return {entry.key: getattr(self, entry.attribute) for entry in self.parameters()}
+
+    def with_frictions(self, static_friction: float, dynamic_friction: float) -> Self:
+        """Return the law with another f_S and f_D, %, all else kept."""
+        both = {"static_friction": static_friction, "dynamic_friction": dynamic_friction}
+        return dataclasses.replace(self, **both)

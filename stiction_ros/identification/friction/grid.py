@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -96,6 +96,19 @@ def finer_grid(centres: FloatArray, step: float, limit: float, half: int = 3) ->
     dynamic = np.clip(rows[:, 1], 0.0, static)
     grid = _without_repetition(np.column_stack([static, dynamic]))
     return np.asarray(grid[grid[:, 0] > 0.0])
+
+
+def behaviour_of(
+    law: str, frictions: tuple[float, float], further: Mapping[str, float]
+) -> Stiction:
+    """Return a law by its name, with f_S and f_D in % and its further parameters by their keys."""
+    static, dynamic = frictions
+    kind = find_law(law)
+    own = kind.rows_of_frictions(np.array([[static, min(dynamic, static)]]))[0].tolist()
+    keys = [entry.key for entry in kind.parameters()]
+    found = kind.from_mapping(dict(zip(keys, own, strict=False)) | dict(further))
+    assert isinstance(found, Stiction)
+    return found
 
 
 def simulate(

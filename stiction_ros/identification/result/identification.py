@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import math
 from collections.abc import Mapping
 from typing import Any, Self
-
-import numpy as np
 
 from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.identification.friction.further import first_values
-from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.friction.grid import behaviour_of, find_law
 from stiction_ros.identification.judgement.figures import Figures
 from stiction_ros.identification.judgement.verdict_kind import VerdictKind
 from stiction_ros.identification.result.cause import Cause
@@ -114,17 +113,31 @@ class ValveEstimate:
         """Return the friction as an effect of a loop model; None for a valve without any."""
         if self.static_friction <= 0.0:
             return None
-        frictions = self.static_friction, min(self.dynamic_friction, self.static_friction)
-        law = find_law(self.law)
-        own = law.rows_of_frictions(np.array([frictions]))[0].tolist()
-        keys = [entry.key for entry in law.parameters()]
-        return law.from_mapping(dict(zip(keys, own, strict=False)) | dict(self.further))
+        frictions = self.static_friction, self.dynamic_friction
+        return behaviour_of(self.law, frictions, self.further)
 
     def with_own_jump(self) -> Self:
         """Return the estimate with the least move of its law, which need not be f_S − f_D."""
         law = self.behaviour() if self.jump > 0.0 else None
         form = law.jump_form() if isinstance(law, Stiction) else None
         return self if form is None else dataclasses.replace(self, jump=form.least)
+
+    @property
+    def rows(self) -> dict[str, tuple[float, float, float]]:
+        """Value and ends of the interval of f_S and f_D by ``V1.f_s``, %.
+
+        Of a law other than He's all its parameters follow, as ``V1.kano.s``, which tells the law;
+        their ends are NaN where they follow from those of f_S and f_D.
+        """
+        found = {
+            f"{self.name}.f_s": (self.static_friction, *self.static_interval),
+            f"{self.name}.f_d": (self.dynamic_friction, *self.dynamic_interval),
+        }
+        law = None if self.law == "he" else self.behaviour()
+        for entry in () if law is None else law.parameters():
+            ends = self.further_intervals.get(entry.key, (math.nan, math.nan))
+            found[f"{self.name}.{self.law}.{entry.key}"] = (getattr(law, entry.attribute), *ends)
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""
@@ -255,6 +268,11 @@ class Identification:
     def __repr__(self) -> str:
         valves = ", ".join(f"{valve.name} {valve.verdict}" for valve in self.valves)
         return f"<Identification {self.status}: {valves or self.reason}; {self.samples} samples>"
+
+    @property
+    def rows(self) -> dict[str, tuple[float, float, float]]:
+        """What the valves say, as :attr:`ValveEstimate.rows`."""
+        return {name: row for valve in self.valves for name, row in valve.rows.items()}
 
     def summary(self) -> str:
         """Return verdicts, frictions, what to do next and the process as text of 80 columns."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from sensor_msgs.msg import JointState
@@ -15,7 +16,7 @@ from stiction_ros.texts import json_text
 if TYPE_CHECKING:
     from stiction_ros.identification.valve_test.judgement import Judgement
 
-Row = tuple[str, float, tuple[float, float]]
+Rows = Mapping[str, tuple[float, float, float]]
 Keys = list[tuple[str, object]]
 
 
@@ -27,11 +28,7 @@ def friction_message(stamp: int, token: str, found: Identification | None) -> Jo
         token: ``valid_from`` of the loop model in force, as text.
         found: the fit, or None when the window was not usable.
     """
-    rows = []
-    for valve in () if found is None else found.valves:
-        rows.append((f"{valve.name}.f_s", valve.static_friction, valve.static_interval))
-        rows.append((f"{valve.name}.f_d", valve.dynamic_friction, valve.dynamic_interval))
-    return _friction(stamp, token, rows)
+    return _friction(stamp, token, {} if found is None else found.rows)
 
 
 def tested_message(stamp: int, valve: str, found: Judgement) -> JointState:
@@ -42,17 +39,17 @@ def tested_message(stamp: int, valve: str, found: Judgement) -> JointState:
         valve: tag.
         found: the verdict.
     """
-    rows = [
-        (f"{valve}.f_s", found.f_s, found.f_s_interval),
-        (f"{valve}.f_d", found.f_d, found.f_d_interval),
-    ]
+    rows = {
+        f"{valve}.f_s": (found.f_s, *found.f_s_interval),
+        f"{valve}.f_d": (found.f_d, *found.f_d_interval),
+    }
     return _friction(stamp, ControlMode.VALVE_TEST, rows)
 
 
-def _friction(stamp: int, by: str, rows: list[Row]) -> JointState:
-    message = joint_state(stamp, [name for name, _, _ in rows], [value for _, value, _ in rows])
-    message.velocity = [interval[0] for _, _, interval in rows]
-    message.effort = [interval[1] for _, _, interval in rows]
+def _friction(stamp: int, by: str, rows: Rows) -> JointState:
+    message = joint_state(stamp, list(rows), [value for value, _, _ in rows.values()])
+    message.velocity = [low for _, low, _ in rows.values()]
+    message.effort = [high for _, _, high in rows.values()]
     message.header.frame_id = by
     return message
 
@@ -61,8 +58,8 @@ def fit_status(stamp: int, update: FitUpdate) -> tuple[str, str, Keys]:
     """Return task, message and key-values of one fit, which is told once."""
     keys: Keys = [("window_end", stamp)]
     for name, friction in update.trusted.items():
-        keys.append((f"{name}.trusted_f_s", friction.static_friction))
-        keys.append((f"{name}.trusted_f_d", friction.dynamic_friction))
+        keys.append((f"{name}.trusted_law", friction.law))
+        keys += [(f"{name}.trusted_{key}", value) for key, value in friction.figures().items()]
     keys.append(("identification", json_text(update.identification.to_dict(), indent=None)))
     return "fit", verdicts_of(update), keys
 

@@ -112,12 +112,17 @@ class LiveController:
         return self._controller.frictions
 
     def known_friction(self) -> list[tuple[str, float]]:
-        """Return the friction in force as pairs such as ``("V1.f_s", 8.0)``, in %."""
+        """Return the friction in force as pairs such as ``("V1.f_s", 8.0)``, in %.
+
+        They are f_S, f_D and what else the law has for parameters.
+        """
         return [
-            (f"{name}.{entry.key}", getattr(friction, entry.attribute))
-            for name, friction in zip(self.model.valve_names, self.frictions, strict=True)
-            if friction is not None
-            for entry in friction.parameters()
+            (f"{name}.{key}", value)
+            for name, form in zip(
+                self.model.valve_names, self._controller.valves.forms, strict=True
+            )
+            if form is not None
+            for key, value in form.law.figures().items()
         ]
 
     @property

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise
+from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, OutputModel
+from stiction_ros.identification.friction.grid import find_law, simulate
 from stiction_ros.records import Record
 
 FORGETTING = 0.97  # of the high-pass that takes slow disturbances out
@@ -165,10 +167,11 @@ class Evidence:
         op: FloatArray,
         stem: FloatArray,
         pv: FloatArray,
+        laws: Mapping[int, Stiction],
         first: int = 0,
     ) -> None:
-        """Take a window; ``pv`` has shape (n, p)."""
-        self.reference, self.first = reference, first
+        """Take a window; ``pv`` has shape (n, p), ``laws`` are the trusted ones by valve index."""
+        self.reference, self.first, self._laws = reference, first, laws
         self.op, self.stem, self.pv = op, stem, pv
         moves = [np.flatnonzero(np.diff(column)) + 1 for column in stem.T]
         self.moves = [found[found >= first] for found in moves]
@@ -187,6 +190,20 @@ class Evidence:
                 for j, valve in enumerate(reference.valves)
             ]
             self._gains.append(np.column_stack(gains))
+
+    def stems(self, valve: int, first: int, grid: FloatArray) -> FloatArray:
+        """Return stems of ``valve`` from ``first`` on by its law, shape (n − first, G), %.
+
+        Args:
+            valve: index.
+            first: sample at whose beginning the stem rests where it is trusted to be.
+            grid: rows (f_S, f_D), %, shape (G, 2).
+        """
+        law = self._laws[valve]
+        further = [getattr(law, entry.attribute) for entry in law.parameters()[2:]]
+        op = np.ascontiguousarray(self.op[first:, valve])
+        start = float(self.stem[max(first - 1, 0), valve])
+        return simulate(find_law(str(law.law)), grid, op, start, further)
 
     def signature(self, valve: int, stems: FloatArray) -> list[FloatArray]:
         """Return what the stems of ``valve`` would change, per output, in σ.

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-import itertools
 
 import numpy as np
 
-from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.online.estimator.change_evidence import START_ROWS, Evidence, Share
 from stiction_ros.online.estimator.trust import Interval, TrustedFriction
@@ -32,6 +30,7 @@ FINELY = 3  # of the moves are looked at on a fine grid
 BEFORE = 10  # and moves before each that may be the first of the new friction
 DYNAMIC_ERROR = 0.008  # standard error of f_D, in f_S, that no number of moves takes away
 EXPLAINED = 3.0  # mean square of the innovations up to which the trusted friction is not replaced
+NUDGE = 1e-6  # of f_S, by which f_D is moved to see what the stem makes of it: no slip hangs on it
 WORST = 2.0  # mean square of the innovations that a new friction may leave
 
 STATIC_SHARES = np.geomspace(0.2, 3.0, 92)  # steps of 3 %
@@ -251,10 +250,8 @@ def _gains(
 
     Both over the samples from ``begin`` on, None for ``first``.
     """
-    op = np.ascontiguousarray(evidence.op[first:, valve])
-    start = float(evidence.stem[max(first - 1, 0), valve])
-    stems = HeStiction.simulate_grid(grid, op, start)
-    keys = np.random.default_rng(0).standard_normal(len(op)) @ stems
+    stems = evidence.stems(valve, first, grid)
+    keys = np.random.default_rng(0).standard_normal(len(stems)) @ stems
     _, chosen, back = np.unique(keys, return_index=True, return_inverse=True)
     gains, left = evidence.gains(valve, first, stems[:, chosen], begin)
     return gains[back], left[back]
@@ -357,8 +354,7 @@ def _around(dynamic: float, error: float) -> Interval:
 
 
 def _stems(evidence: Evidence, valve: int, first: int, static: float, dynamic: float) -> FloatArray:
-    law = HeStiction(static, min(dynamic, static))
-    return law.simulate(evidence.op[first:, valve], float(evidence.stem[max(first - 1, 0), valve]))
+    return evidence.stems(valve, first, np.array([[static, min(dynamic, static)]]))[:, 0]
 
 
 def _dynamic_step(
@@ -366,11 +362,8 @@ def _dynamic_step(
 ) -> tuple[float, float]:
     """Return by how much f_D should change with the moves as they are, and its error, %."""
     stems = _stems(evidence, valve, first, static, dynamic)
-    before = np.concatenate([[evidence.stem[max(first - 1, 0), valve]], stems[:-1]])
-    slips = np.flatnonzero(stems != before)
-    held = np.zeros(len(stems))
-    for a, b in itertools.pairwise([*slips, len(stems)]):
-        held[a:b] = -np.sign(evidence.op[first + a, valve] - before[a])
+    nudge = NUDGE * static * (-1.0 if dynamic > 0.5 * static else 1.0)
+    held = (_stems(evidence, valve, first, static, dynamic + nudge) - stems) / nudge
     whole = evidence.stem[:, valve].copy()
     whole[first:] = stems
     changed = evidence.signature(valve, whole)
@@ -383,11 +376,15 @@ def _dynamic_step(
 def _rivals(
     evidence: Evidence, valve: int, trusted: TrustedFriction, first: int
 ) -> tuple[float, float]:
-    """Return the best log likelihoods from ``first`` on of little friction, and of more."""
+    """Return the best log likelihoods from ``first`` on of little friction, and of more.
+
+    A stem that is at OP is little friction, though not every law has it there without friction.
+    """
     little = np.array([(s, s * d) for s in LOW_STATIC for d in LOW_DYNAMIC])
     more = np.array([(s, d * s) for s in STATIC_SHARES for d in (0.0, 0.1, 0.25, 0.5, 0.75, 1.0)])
     gains = [
         float(_gains(evidence, valve, first, grid * trusted.static_friction)[0].max())
         for grid in (little, more)
     ]
-    return gains[0], gains[1]
+    follows, _ = evidence.gains(valve, first, evidence.op[first:, [valve]])
+    return max(gains[0], float(follows[0])), gains[1]

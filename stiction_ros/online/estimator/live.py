@@ -9,13 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
 from stiction_ros.identification import (
     Identification,
     IdentificationOptions,
     OutputModel,
     identify,
 )
+from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.identification_options import AUTO
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.change_evidence import LEAST_ROWS, Evidence, Reference
 from stiction_ros.online.estimator.friction_change import (
@@ -34,6 +38,11 @@ from stiction_ros.settings import setting
 METHOD = "exact"
 """Search of the windows: a sliding window is fitted again and again, beside a loop that runs."""
 
+LAWS = ("he", "kano", "choudhury", "xch", "semi_physical", AUTO)
+
+LAW_METHOD = "evidence"
+"""Search that tells a law which is left open."""
+
 
 @dataclasses.dataclass(frozen=True)
 class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
@@ -44,14 +53,37 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
     input_order: int = setting(0, "n_b of the ARX model; 0 chooses by BIC", low=0, high=20)
     delay_low: int = setting(0, "smallest delay tried, samples", low=0)
     delay_high: int = setting(10, "largest delay tried, samples", low=0)
+    law: str = setting(
+        "he",
+        "friction law of the valves; auto asks each window, until friction is trusted, whether "
+        "another law than he explains PV better, which takes several times as long",
+        choices=LAWS,
+    )
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The searches that fits take."""
+        return (LAW_METHOD, METHOD) if self.law == AUTO else (METHOD,)
 
     def options(self) -> IdentificationOptions:
-        """Return what :func:`stiction_ros.identification.identify` is asked."""
+        """Return what :func:`stiction_ros.identification.identify` is asked.
+
+        Raises:
+            InputError: no such law, or one that cannot be followed sample by sample.
+        """
+        if self.law != AUTO and find_law(self.law).switching is None:
+            raise InputError(
+                f"{self.law} is not identified in a running loop: every slip hangs on the one "
+                "before, so that a small error of f_S soon makes another stem",
+                where="law",
+                fix="identify a record by stiction identify, and give the valve to the controller",
+            )
         return IdentificationOptions(
             output_order=self.output_order or None,
             input_order=self.input_order or None,
             delay=(self.delay_low, self.delay_high),
             method=METHOD,
+            law=self.law,
             check_columns=False,
         )
 
@@ -84,7 +116,17 @@ class _Change:
 
 
 def fit(record: Record, options: IdentificationOptions) -> Identification:
-    """Run one fit; a plain function, so that a worker process can run it."""
+    """Run one fit; a plain function, so that a worker process can run it.
+
+    Where the law is left open, the default search tells it, and the window is fitted by it. Where
+    valves differ in their laws, what that search has found is kept.
+    """
+    if options.law == AUTO:
+        found = identify(record, dataclasses.replace(options, method=LAW_METHOD))
+        laws = {valve.law for valve in found.valves if valve.verdict.has_friction}
+        if len(laws) > 1:
+            return found
+        options = dataclasses.replace(options, law=min(laws, default=options.first_law))
     return identify(record, options)
 
 
@@ -140,6 +182,14 @@ class LiveEstimator:
         self._trust.retune(settings)
         self._op = deque(self._op, maxlen=settings.window)
         self._pv = deque(self._pv, maxlen=settings.window)
+
+    def options(self) -> IdentificationOptions:
+        """Return what the next fit is asked; a law that is trusted is kept."""
+        laws = {friction.law for friction in self._trust.trusted.values()}
+        options = self.settings.options()
+        if self.settings.law != AUTO or len(laws) != 1:
+            return options
+        return dataclasses.replace(self.settings, law=min(laws)).options()
 
     def add(self, sample: int, op: FloatArray, pv: FloatArray) -> Record | None:
         """Take in one sample, OP (m,) and PV (p,); return the window when a fit is due.
@@ -235,7 +285,7 @@ class LiveEstimator:
 
     def _evidence(self, reference: Reference, end: int, record: Record) -> Evidence | None:
         """Return the evidence of a window, from where its stems are known; None if nowhere."""
-        begin, laws = end + 1 - len(record), self._trust.trusted
+        begin = end + 1 - len(record)
         before = None
         seen, since = self._seen, 0 if self._seen is None else begin - self._seen[0]
         if self._anchor is not None and self._anchor[0] < begin and seen is not None and since > 0:
@@ -246,13 +296,14 @@ class LiveEstimator:
         if not len(record):
             return None
         stem, sure = record.op.copy(), 0
-        for name, friction in laws.items():
-            j, law = self.valves.index(name), friction.behaviour()
-            u = record.op[:, j]
+        laws: dict[int, Stiction] = {}
+        for name, friction in self._trust.trusted.items():
+            j = self.valves.index(name)
+            u, law = record.op[:, j], laws.setdefault(j, friction.behaviour())
             if before is not None:
                 stem[:, j] = law.simulate(u, float(before.stem[-1, j]))
                 continue
-            reach = law.static_friction
+            reach = friction.static_friction
             tried = [law.simulate(u, float(u[0]) + s * reach) for s in (-1.0, 0.0, 1.0)]
             apart = np.flatnonzero(np.ptp(tried, axis=0))
             stem[:, j] = tried[1]
@@ -261,12 +312,13 @@ class LiveEstimator:
             return None
         op, pv = record.op[sure:], record.pv[sure:]
         if before is None:
-            return Evidence(reference, op, stem[sure:], pv)
+            return Evidence(reference, op, stem[sure:], pv, laws)
         return Evidence(
             reference,
             np.vstack([before.op, op]),
             np.vstack([before.stem, stem]),
             np.vstack([before.pv, pv]),
+            laws,
             len(before.op),
         )
 

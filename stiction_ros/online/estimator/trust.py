@@ -6,8 +6,9 @@ import dataclasses
 from collections.abc import Container, Mapping, Sequence
 from typing import Self
 
-from stiction_ros.effects import HeStiction
+from stiction_ros.effects import Stiction
 from stiction_ros.identification import ValveEstimate, VerdictKind
+from stiction_ros.identification.friction.grid import behaviour_of
 from stiction_ros.settings import setting
 
 Interval = tuple[float, float]
@@ -42,7 +43,7 @@ class TrustRule:
 
 @dataclasses.dataclass(frozen=True)
 class TrustedFriction:
-    """Friction of one valve that the controller may rely on; % of travel.
+    """Friction of one valve that the controller may rely on, by one law; % of travel.
 
     After a growth of friction only one move that failed and one that did not may be known, with
     much in between. Then the friction is not ``settled``: it is offered at the lower end of its
@@ -54,6 +55,21 @@ class TrustedFriction:
     dynamic_friction: float
     dynamic_interval: Interval
     settled: bool = True
+    law: str = "he"
+    further: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+    @classmethod
+    def of(cls, found: ValveEstimate, tolerance: float) -> Self:
+        """Return what one window says, its intervals widened by ``tolerance`` of f_S."""
+        slack = tolerance * found.static_friction
+        return cls(
+            found.static_friction,
+            _widened(found.static_interval, slack),
+            found.dynamic_friction,
+            _widened(found.dynamic_interval, slack),
+            law=found.law,
+            further=found.further,
+        )
 
     @property
     def offered_interval(self) -> Interval:
@@ -86,9 +102,14 @@ class TrustedFriction:
             settled=settled,
         )
 
-    def behaviour(self) -> HeStiction:
-        """Return He's law with these values."""
-        return HeStiction(self.static_friction, min(self.dynamic_friction, self.static_friction))
+    def figures(self) -> dict[str, float]:
+        """Return f_S, f_D and the further parameters of the law, by their keys."""
+        return {"f_s": self.static_friction, "f_d": self.dynamic_friction, **self.further}
+
+    def behaviour(self) -> Stiction:
+        """Return the law with these values."""
+        frictions = self.static_friction, self.dynamic_friction
+        return behaviour_of(self.law, frictions, self.further)
 
 
 class ValveTrust:
@@ -108,13 +129,7 @@ class ValveTrust:
 
         A ``firm`` trust is narrowed, but not replaced.
         """
-        slack = self.rule.tolerance * estimate.static_friction
-        found = TrustedFriction(
-            estimate.static_friction,
-            _widened(estimate.static_interval, slack),
-            estimate.dynamic_friction,
-            _widened(estimate.dynamic_interval, slack),
-        )
+        found = TrustedFriction.of(estimate, self.rule.tolerance)
         if self.trusted is not None:
             self._revise(found, estimate.verdict, firm)
         elif estimate.verdict.has_friction:
@@ -138,7 +153,7 @@ class ValveTrust:
         if both is not None:
             self.trusted, self._disjoint_windows = both, 0
             return
-        if firm:
+        if firm and found.law == self.trusted.law:
             return
         said = VerdictKind.STICKY if verdict.has_friction else verdict  # with a jump or without
         if said is not self._disjoint_verdict:
@@ -197,22 +212,29 @@ def alike(one: Mapping[str, TrustedFriction], other: Mapping[str, TrustedFrictio
     return all(
         abs(a.static_friction - b.static_friction) <= UNIMPORTANT * b.static_friction
         and abs(a.dynamic_friction - b.dynamic_friction) <= UNIMPORTANT * b.static_friction
-        and a.settled == b.settled
+        and (a.settled, a.law) == (b.settled, b.law)
         for a, b in ((one[name], other[name]) for name in one)
     )
 
 
 def _combine(old: TrustedFriction, new: TrustedFriction) -> TrustedFriction | None:
-    """Return the intersection, the old point kept where it still fits; None when disjoint."""
+    """Return the intersection, the old point kept where it still fits; None when disjoint.
+
+    Frictions of two laws are two frictions.
+    """
+    if old.law != new.law:
+        return None
     static = _intersect(old.static_interval, new.static_interval)
     dynamic = _intersect(old.dynamic_interval, new.dynamic_interval)
     if static is None or dynamic is None:
         return None
-    return TrustedFriction(
-        min(max(old.static_friction, static[0]), static[1]),
-        static,
-        min(max(old.dynamic_friction, dynamic[0]), dynamic[1]),
-        dynamic,
+    return dataclasses.replace(
+        old,
+        static_friction=min(max(old.static_friction, static[0]), static[1]),
+        static_interval=static,
+        dynamic_friction=min(max(old.dynamic_friction, dynamic[0]), dynamic[1]),
+        dynamic_interval=dynamic,
+        settled=True,
     )
 
 

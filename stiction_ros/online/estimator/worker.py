@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
@@ -29,8 +29,9 @@ class FitWorker:
     memory, the fits it had fail and the next one gets a new process.
     """
 
-    def __init__(self) -> None:
-        """Start the process and let it load what it needs."""
+    def __init__(self, methods: Sequence[str] = (METHOD,)) -> None:
+        """Start the process and let it load what fits by ``methods`` need."""
+        self._methods = tuple(methods)
         self._start()
 
     def _start(self) -> None:
@@ -40,7 +41,7 @@ class FitWorker:
         self._ready = self._pool.submit(os.getpid)
         self._processes = set(multiprocessing.active_children()) - others
         # Before the first window is full.
-        self._compiled = self._pool.submit(compile_loops, (METHOD,), helped=True)
+        self._compiled = self._pool.submit(compile_loops, self._methods, helped=True)
 
     @property
     def pid(self) -> int:

@@ -11,6 +11,7 @@ from stiction_ros.effects.behaviour import Behaviour
 from stiction_ros.errors import is_finite
 from stiction_ros.loop import LoopModel
 
+ROUNDING = 1e-9  # share by which f_S that S and J tell may miss what it was made of
 ALIKE = 0.02  # share by which two estimates of one friction may differ
 
 
@@ -78,7 +79,8 @@ def _spread(friction: Behaviour, entry: Mapping[str, Any]) -> FrictionSpread | N
         low, high = interval
         if not all(isinstance(end, int | float) and is_finite(end) for end in (low, high)):
             return None
-        if not low <= value <= high:
+        beyond = max(low - value, value - high, 0.0)
+        if beyond > ROUNDING * max(abs(high), 1.0):
             return None
         widths.append(max(value - low, high - value))
     return FrictionSpread(*widths)

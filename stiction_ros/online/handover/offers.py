@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from stiction_ros.control import FrictionSpread, History, MpcController
-from stiction_ros.effects import HeStiction
+from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.handover.known_friction import alike, scaled
@@ -149,10 +149,13 @@ def _within(
     for static, dynamic in itertools.product((-1.0, 1.0), repeat=2):
         corner: list[Behaviour | None] = []
         for law, spread in zip(frictions, spreads, strict=True):
-            if isinstance(law, HeStiction) and spread is not None:
-                static_friction = max(law.static_friction + static * spread.static, 0.0)
-                dynamic_friction = max(law.dynamic_friction + dynamic * spread.dynamic, 0.0)
-                law = HeStiction(static_friction, min(dynamic_friction, static_friction))
+            form = law.jump_form() if isinstance(law, Stiction) else None
+            if form is not None and spread is not None:
+                static_friction = max(form.static_friction + static * spread.static, 0.0)
+                dynamic_friction = max(form.dynamic_friction + dynamic * spread.dynamic, 0.0)
+                law = form.law.with_frictions(
+                    static_friction, min(dynamic_friction, static_friction)
+                )
             corner.append(law)
         if corner != list(frictions):
             found.append(tuple(corner))

@@ -17,6 +17,7 @@ from stiction_ros.identification import (
     ValveEstimate,
     VerdictKind,
 )
+from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.monitor.gap_finding import GapFinding
@@ -55,11 +56,7 @@ class ReplayedFit:
     @property
     def rows(self) -> dict[str, tuple[float, float, float]]:
         """Value, lower and upper end by ``V1.f_s``, %, as ``stiction`` carries them."""
-        found: dict[str, tuple[float, float, float]] = {}
-        for valve in self.update.identification.valves if self.update is not None else ():
-            found[f"{valve.name}.f_s"] = (valve.static_friction, *valve.static_interval)
-            found[f"{valve.name}.f_d"] = (valve.dynamic_friction, *valve.dynamic_interval)
-        return found
+        return {} if self.update is None else self.update.identification.rows
 
 
 class ReplayedEstimator:
@@ -163,7 +160,7 @@ class ReplayedEstimator:
             self._conclude(live, end, identification_of(mapping), whole=False)
             return
         try:
-            found = self._fitter(record, live.settings.options())
+            found = self._fitter(record, live.options())
         except Exception as error:  # the node goes on after a fit that fails, so does its replay
             said = str(error) if isinstance(error, InputError) else repr(error)
             self._unusable(end, f"window not usable: {said}")
@@ -231,6 +228,11 @@ def _valve(valve: Mapping[str, Any]) -> ValveEstimate:
         stem_start=math.nan,
         moves=0,
         evidence={},
+        further={
+            entry.key: float(valve[entry.key])
+            for entry in find_law(str(valve["law"])).parameters()[2:]
+            if entry.key in valve
+        },
     )
 
 

@@ -57,7 +57,7 @@ def match_modes(recorded: Sequence[ModeChange], replayed: Sequence[ModeChange]) 
         for key in ("mode", "stamp", "model", "reason", "frictions"):
             was, found = getattr(one, key), getattr(other, key)
             if key == "frictions":
-                was, found = dict(was), dict(found)
+                was, found = dict(was), as_told(was, found)
             if was != found:
                 said = f"change {number}: {key} recorded {was!r}, replayed {found!r}"
                 return ModeMatch(*both, Match.DIFFERENT, said)
@@ -109,11 +109,9 @@ def _trust_differs(bag: ReplayBag, published: PublishedFit, fit: ReplayedFit) ->
     trusted = {
         f"{valve}.{key}": value
         for valve, friction in fit.update.trusted.items()
-        for key, value in (
-            ("f_s", friction.static_friction),
-            ("f_d", friction.dynamic_friction),
-        )
+        for key, value in friction.figures().items()
     }
+    trusted = as_told(told.trusted, trusted)
     return first_difference(dict(told.trusted), trusted, "trusted") or _model_differs(bag, fit)
 
 

@@ -219,11 +219,14 @@ def _force(change: ModeChange) -> tuple[object, ...]:
 
 
 def _frictions(values: Mapping[str, str], mark: str) -> dict[str, float]:
-    """Return ``V1.f_s`` → value from keys such as ``V1.f_s`` or ``V1.trusted_f_s``."""
+    """Return ``V1.f_s`` → value from keys such as ``V1.f_s`` or ``V1.trusted_f_s``.
+
+    What a law has for further parameters is among them; its name is no number and is not.
+    """
     found = {}
     for key, value in values.items():
         valve, dot, name = key.rpartition(mark)
-        if not (valve and dot and name in ("f_s", "f_d")):
+        if not (valve and dot and name):
             continue
         with contextlib.suppress(ValueError):
             found[f"{valve}.{name}"] = float(value)

@@ -11,7 +11,7 @@ import pytest
 
 from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlMode, StepStatus
-from stiction_ros.effects import ChoudhuryStiction, HeStiction
+from stiction_ros.effects import HeStiction, SmoothedHeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints
 from stiction_ros.online.controller.live import LiveController
@@ -663,7 +663,7 @@ def test_embedding_without_friction_says_so() -> None:
 
 def test_a_law_without_a_jump_form_is_refused_as_a_value() -> None:
     live = LiveController(SETTINGS, PROCESS)
-    other = PROCESS.with_valve_effects({"V1": [ChoudhuryStiction(7.0, 3.0)]})
+    other = PROCESS.with_valve_effects({"V1": [SmoothedHeStiction(7.0, 3.0)]})
     assert "no jump form" in refusal_of(live, other)
 
 

@@ -7,7 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.effects import HeStiction
+from stiction_ros.control.jump_form import jump_form
+from stiction_ros.effects import (
+    ChoudhuryStiction,
+    FrictionPair,
+    HeStiction,
+    KanoStiction,
+    Stiction,
+    XchStiction,
+)
 from stiction_ros.identification import OutputModel
 from stiction_ros.online.estimator.change_evidence import Evidence, OutputReference, Reference
 from stiction_ros.online.estimator.friction_change import (
@@ -27,38 +35,48 @@ MODEL = OutputModel("PV1", (-0.9,), {"V1": (0.1,)}, {"V1": 1}, 0.0, NOISE, 99.0,
 REFERENCE = Reference(("V1",), (OutputReference(MODEL, np.zeros(0), NOISE),))
 
 
-def kicks(least: float, most: float, seed: int = 0, small: float | None = None) -> np.ndarray:
+def kicks(
+    least: float, most: float, seed: int = 0, small: float | None = None, old: Stiction = OLD
+) -> np.ndarray:
     """OP that moves a stem by kicks every 15 samples, as its controller takes it to be.
 
     OP leads the believed stem by ``least`` to ``most`` % for one sample, and rests there after;
     three times after the change only by ``small`` % where that is given.
     """
-    random = np.random.default_rng(seed)
+    random, form = np.random.default_rng(seed), jump_form(old)
     op, stem = np.full(SAMPLES, 50.0), 50.0
     for k in range(0, SAMPLES, 15):
         size = random.uniform(least, most)
         if small is not None and CHANGE <= k < CHANGE + 45:
             size = small
         lead = size * (1.0 if stem < 50.0 else -1.0)
-        op[k] = stem + lead
-        stem = op[k] - np.sign(lead) * OLD.dynamic_friction
-        op[k + 1 : k + 15] = stem
+        way = form.way(stem, stem, stem + lead)
+        op[k : k + len(way)] = way
+        stem = way[-1] - np.sign(lead) * form.dynamic_friction
+        op[k + len(way) : k + 15] = stem
     return op
 
 
 def evidence(
-    op: np.ndarray, new: HeStiction | None, *, seed: int = 1, gain: float = 1.0, load: float = 0.0
+    op: np.ndarray,
+    new: Stiction | None,
+    *,
+    seed: int = 1,
+    gain: float = 1.0,
+    load: float = 0.0,
+    old: Stiction = OLD,
 ) -> Evidence:
     """A record whose valve changes at :data:`CHANGE`; None for one without friction."""
-    stem = OLD.simulate(op, 50.0)
-    stem[CHANGE:] = op[CHANGE:] if new is None else new.simulate(op[CHANGE:], stem[CHANGE - 1])
+    stem = old.simulate(op, 50.0)
+    start = float(stem[CHANGE - 1])
+    stem[CHANGE:] = op[CHANGE:] if new is None else new.simulate(op[CHANGE:], start)
     pv = np.zeros(SAMPLES)
     for k in range(2, SAMPLES):
         pv[k] = 0.9 * pv[k - 1] + gain * 0.1 * (stem[k - 2] - 50.0)
     pv[CHANGE:] += load
     pv += NOISE * np.random.default_rng(seed).standard_normal(SAMPLES)
-    trusted = OLD.simulate(op, 50.0)
-    return Evidence(REFERENCE, op[:, None], trusted[:, None], pv[:, None])
+    trusted = old.simulate(op, 50.0)
+    return Evidence(REFERENCE, op[:, None], trusted[:, None], pv[:, None], {0: old})
 
 
 RULE = ChangeRule()
@@ -129,6 +147,21 @@ def test_a_valve_that_stays_where_it_should_have_moved_sticks_more(
     assert len(found.before.op) <= SAMPLES - found.samples
 
 
+@pytest.mark.parametrize("kind", [KanoStiction, ChoudhuryStiction, XchStiction])
+def test_a_change_is_seen_by_the_law_that_is_trusted(kind: type[FrictionPair]) -> None:
+    old = kind.from_frictions(5.0, 2.0)
+    trusted = dataclasses.replace(TRUSTED, law=kind.law)
+    op = kicks(5.5, 9.0, old=old)
+    new = (old, None, old.with_frictions(7.5, 2.0))
+    found = [look_for_change(RULE, evidence(op, one, old=old), 0, trusted) for one in new]
+    assert [one.status for one in found] == list(ChangeStatus)
+    assert found[2].friction is not None
+    grown = found[2].friction.behaviour()
+    assert isinstance(grown, kind)
+    assert grown.static_friction == pytest.approx(7.5, abs=0.4)
+    assert grown.dynamic_friction == pytest.approx(2.0, abs=0.25)
+
+
 def test_the_same_stems_are_as_likely_from_wherever_they_are_said_to_begin() -> None:
     """Held against the same samples, that is; a gain left open fits fewer of them better."""
     seen = evidence(kicks(5.5, 9.0), HeStiction(7.5, 2.0))
@@ -154,7 +187,7 @@ def test_a_wide_interval_is_offered_from_below_and_narrowed_by_what_follows() ->
     seen = evidence(op, new)
     stem = seen.stem.copy()
     stem[CHANGE:, 0] = HeStiction(5.6, 2.0).simulate(op[CHANGE:], stem[CHANGE - 1, 0])
-    seen = Evidence(REFERENCE, seen.op, stem, seen.pv, CHANGE)
+    seen = Evidence(REFERENCE, seen.op, stem, seen.pv, {0: OLD}, CHANGE)
     found = narrowed(seen, 0, wide, whole=True)
     assert found.settled
     assert found.static_interval[0] <= 7.5 <= found.static_interval[1]
@@ -190,6 +223,7 @@ def test_two_valves_are_told_apart() -> None:
         np.column_stack([first.op[:, 0], other]),
         np.column_stack([first.stem[:, 0], second]),
         pv[:, None],
+        {0: OLD, 1: OLD},
     )
     found = [look_for_change(ChangeRule(), seen, j, TRUSTED).status for j in range(2)]
     assert found == [ChangeStatus.SERVICED, ChangeStatus.UNCHANGED]

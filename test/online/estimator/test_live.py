@@ -11,12 +11,14 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification import (
     FitStatus,
     Identification,
+    IdentificationOptions,
     OutputModel,
     ValveEstimate,
     VerdictKind,
 )
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.estimator.live import EstimatorSettings, FitUpdate, LiveEstimator
+from stiction_ros.online.estimator.live import EstimatorSettings, FitUpdate, LiveEstimator, fit
+from stiction_ros.records import Record
 
 SETTINGS = EstimatorSettings(
     fit_first=20, fit_every=10, fit_latency=5, window=30, confirmations=1, tolerance=0.0
@@ -86,6 +88,50 @@ def test_a_window_does_not_change_when_more_comes_in() -> None:
     live.add(20, mine, mine)
     assert record is not None
     assert np.all(record.op == 1.0)
+
+
+@pytest.mark.parametrize("law", ["he", "kano", "choudhury", "xch", "auto"])
+def test_every_law_is_asked_for(law: str) -> None:
+    options = EstimatorSettings(law=law).options()
+    assert (options.law, options.method) == (law, "exact")
+
+
+def test_a_law_that_is_not_identified_is_refused() -> None:
+    with pytest.raises(InputError, match=r"law: unknown friction law .* mean kano"):
+        EstimatorSettings(law="kanu").options()
+    with pytest.raises(InputError, match="law: semi_physical is not identified in a running loop"):
+        EstimatorSettings(law="semi_physical").options()
+
+
+def test_a_law_left_open_is_kept_once_it_is_trusted() -> None:
+    live = estimator(dataclasses.replace(SETTINGS, law="auto"))
+    assert live.options().law == "auto"
+    fit = found()
+    kano = dataclasses.replace(fit.valves[0], law="kano")
+    live.conclude(19, dataclasses.replace(fit, valves=(kano,)))
+    assert live.options().law == "kano"
+
+
+def test_a_law_left_open_is_that_of_the_default_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, str]] = []
+
+    def told(record: Record, options: IdentificationOptions) -> Identification:
+        asked.append((options.method, options.law))
+        return dataclasses.replace(known, valves=tuple(valves))
+
+    monkeypatch.setattr("stiction_ros.online.estimator.live.identify", told)
+    known, options = found(), EstimatorSettings(law="auto").options()
+    sticky = dataclasses.replace(known.valves[0], law="kano")
+    healthy = dataclasses.replace(known.valves[0], verdict=VerdictKind.HEALTHY)
+    record = Record("loop", 2.0, ("V1",), ("PV1",), np.zeros((30, 1)), np.zeros((30, 1)))
+    valves = [sticky, healthy]
+    fit(record, options)
+    valves = [healthy]
+    fit(record, options)
+    assert asked == [("evidence", "auto"), ("exact", "kano"), ("evidence", "auto"), ("exact", "he")]
+    valves, asked = [sticky, known.valves[0]], []
+    assert [valve.law for valve in fit(record, options).valves] == ["kano", "he"]
+    assert asked == [("evidence", "auto")]
 
 
 def test_a_loop_model_comes_with_the_first_trust_only() -> None:

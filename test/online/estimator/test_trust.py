@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.effects import HeStiction
+from stiction_ros.effects import HeStiction, KanoStiction, SemiPhysicalStiction
 from stiction_ros.identification import ValveEstimate, VerdictKind
 from stiction_ros.online.estimator.trust import Trust, TrustedFriction, TrustRule, ValveTrust, alike
 
@@ -33,6 +35,19 @@ def trust_after(*windows: ValveEstimate, rule: TrustRule = EXACT) -> TrustedFric
 
 
 TWO = (window(STICKY), window(STICKY))
+
+
+def test_friction_is_trusted_by_one_law() -> None:
+    kano = dataclasses.replace(window(STICKY), law="kano")
+    assert trust_after(window(STICKY), kano) is None
+    trusted = trust_after(*TWO, kano, kano)
+    assert trusted is not None
+    assert trusted.behaviour() == KanoStiction(7.0, 3.0)
+    assert not alike({"V1": trusted}, {"V1": dataclasses.replace(trusted, law="xch")})
+    slips = dataclasses.replace(window(STICKY), law="semi_physical", further={"k": 1.8})
+    trusted = trust_after(slips, slips)
+    assert trusted is not None
+    assert trusted.behaviour() == SemiPhysicalStiction(5.0, 2.0, 1.8)
 
 
 def test_one_sticky_window_is_not_trusted() -> None:

@@ -15,6 +15,7 @@ from bag_cutting import SECOND, copy_bag, cut_bag
 from bag_making import joint_state, text
 from recorded_runs import SAMPLES, write_run
 
+from stiction_ros.effects import KanoStiction
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification, IdentificationOptions
 from stiction_ros.online.estimator.live import fit
@@ -99,6 +100,17 @@ def test_the_whole_replay_is_equal_without_notes(whole: Replay) -> None:
     assert whole.from_first_sample
     assert whole.first_difference == ""
     assert whole.notes == ()
+
+
+def test_a_run_with_another_law_is_replayed_bit_for_bit(tmp_path: Path) -> None:
+    live = write_run(tmp_path / "bag", KanoStiction(4.0, 2.0), 500)
+    assert live.swap is not None
+    found = replay(tmp_path / "bag")
+    assert (found.match, found.first_difference) == (Match.EQUAL, "")
+    assert list(found.fits[-1].fit.rows) == ["V1.f_s", "V1.f_d", "V1.kano.s", "V1.kano.j"]
+    assert found.modes is not None
+    assert found.modes.swaps[0] is not None
+    assert set(found.modes.swaps[0].frictions) == {"V1.f_s", "V1.f_d", "V1.s", "V1.j"}
 
 
 def test_the_json_tells_fits_modes_and_swap(
