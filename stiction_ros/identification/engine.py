@@ -98,7 +98,7 @@ def judged_valves(
         lambda: [linear_rivals(data, model, linear, orders, j) for j in range(len(data.u))],
         lambda: friction_intervals(data, model, orders, 0, options.confidence),
     )
-    found = []
+    valves = []
     for j in range(len(data.u)):
         intervals = friction_intervals(data, model, orders, j, options.confidence) if j else first
         model = intervals.model
@@ -109,18 +109,34 @@ def judged_valves(
         static = (0.0, intervals.static[1]) if doubted else intervals.static
         dynamic = (0.0, intervals.dynamic[1]) if doubted else intervals.dynamic
         verdict = judge(figures, static, dynamic, span, options)
-        estimate = (intervals.static_estimate, intervals.dynamic_estimate)
-        if doubted and (figures["delta_bic"] < 0.0 or verdict is VerdictKind.HEALTHY):
-            estimate = (0.0, 0.0)
+        healthy = verdict is VerdictKind.HEALTHY
+        f_s, f_d = intervals.static_estimate, intervals.dynamic_estimate
+        if doubted and (figures["delta_bic"] < 0.0 or healthy):
+            f_s = f_d = 0.0
             model = without_friction(data, model, orders, j)
         if record.stem is not None:
             error = model.stems[j] + record.op[:, j].mean() - record.stem[:, j]
             figures["stem_error"] = float(np.mean(error**2))
         figures["patterns"] = float(intervals.patterns)
         figures["patterns_closed"] = float(intervals.closed)
-        found.append((estimate, static, dynamic, verdict, figures, intervals.profile))
-    valves = tuple(_valve(record, model, j, *entry, options) for j, entry in enumerate(found))
-    return valves, model
+        gains = figures["half_1"], figures["half_2"]
+        valve = ValveEstimate(
+            name=record.valves[j],
+            verdict=verdict,
+            law=options.first_law,
+            static_friction=f_s,
+            static_interval=(min(static[0], f_s), max(static[1], f_s)),
+            dynamic_friction=f_d,
+            dynamic_interval=(min(dynamic[0], f_d), max(dynamic[1], f_d)),
+            jump=0.0 if is_deadband(intervals.deadband_loss, static, dynamic) else f_s - f_d,
+            stem_start=float(record.op[0, j] + model.start[j]),
+            moves=int(np.count_nonzero(np.diff(model.stems[j]))),
+            evidence=figures,
+            profile=intervals.profile,
+            stability=Stability(halves(gains, options.bic_margin if healthy else None)),
+        )
+        valves.append(valve)
+    return tuple(valves), model
 
 
 def choose(
@@ -198,35 +214,4 @@ def without_friction(data: Data, model: Model, orders: Orders, valve: int) -> Mo
     friction[valve], start[valve], stems[valve] = 0.0, 0.0, data.u[valve]
     return refit(
         data, dataclasses.replace(model, friction=friction, start=start, stems=stems), orders
-    )
-
-
-def _valve(
-    record: Record,
-    model: Model,
-    j: int,
-    estimate: tuple[float, float],
-    static: tuple[float, float],
-    dynamic: tuple[float, float],
-    verdict: VerdictKind,
-    figures: dict[str, float],
-    profile: tuple[tuple[float, float], ...],
-    options: IdentificationOptions,
-) -> ValveEstimate:
-    f_s, f_d = estimate
-    unheard = options.bic_margin if verdict is VerdictKind.HEALTHY else None
-    return ValveEstimate(
-        name=record.valves[j],
-        verdict=verdict,
-        law=options.first_law,
-        static_friction=f_s,
-        static_interval=(min(static[0], f_s), max(static[1], f_s)),
-        dynamic_friction=f_d,
-        dynamic_interval=(min(dynamic[0], f_d), max(dynamic[1], f_d)),
-        jump=0.0 if is_deadband(figures["deadband_loss"], static, dynamic) else f_s - f_d,
-        stem_start=float(record.op[0, j] + model.start[j]),
-        moves=int(np.count_nonzero(np.diff(model.stems[j]))),
-        evidence=figures,
-        profile=profile,
-        stability=Stability(halves((figures["half_1"], figures["half_2"]), unheard)),
     )

@@ -65,6 +65,11 @@ class Data:
     min_moves: int
     further: tuple[tuple[float, ...], ...] = ()
 
+    def beginning(self, count: int) -> Data:
+        """Return the first ``count`` samples."""
+        y, u = (np.ascontiguousarray(signal[:, :count]) for signal in (self.y, self.u))
+        return dataclasses.replace(self, y=y, u=u)
+
     def further_of(self, valve: int) -> tuple[float, ...]:
         """The law's further parameters at a valve."""
         return self.further[valve] if self.further else ()
@@ -92,6 +97,10 @@ class Model:
     stems: FloatArray
     delays: tuple[tuple[int, ...], ...]
     fits: tuple[OutputFit, ...]
+
+    def beginning(self, count: int) -> Model:
+        """Return the model with the first ``count`` samples of its stems."""
+        return dataclasses.replace(self, stems=np.ascontiguousarray(self.stems[:, :count]))
 
     @property
     def loss(self) -> float:
