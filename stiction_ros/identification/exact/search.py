@@ -37,7 +37,6 @@ from stiction_ros.identification.problem.models import (
     DelayRanges,
     Model,
     ValveScan,
-    scan_criteria,
     scan_valve,
     with_valve,
 )
@@ -129,11 +128,10 @@ def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstSca
         for part, end in zip(starts[1:], ends[1:], strict=True)
     )
     coarse = np.vstack([np.zeros((1, 2)), coarse_grid(limit)])
-    filtered = (Criterion.FREE_RUN, Criterion.INNOVATIONS)
-    scans = scan_criteria(data, model, orders, valve, coarse, start, filtered)
-    by_criterion = dict(zip(filtered, scans, strict=True))
-    one_step = {Criterion.ONE_STEP: everywhere.part(0, len(fine))}
-    return FirstScan(model, valve, one_step | by_criterion, elsewhere)
+    scans = {Criterion.ONE_STEP: everywhere.part(0, len(fine))}
+    for criterion in (Criterion.FREE_RUN, Criterion.INNOVATIONS):
+        scans[criterion] = scan_valve(data, model, orders, valve, coarse, start, criterion)
+    return FirstScan(model, valve, scans, elsewhere)
 
 
 def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) -> Model:

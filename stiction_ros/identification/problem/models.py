@@ -192,22 +192,8 @@ def scan_valve(
         criterion: filter by 1, 1/A or D/A of the model's fits.
         ranges: delays scanned, one range per output; None is that of the data for all.
     """
-    return scan_criteria(data, model, orders, valve, grid, starts, (criterion,), ranges)[0]
-
-
-def scan_criteria(
-    data: Data,
-    model: Model,
-    orders: Orders,
-    valve: int,
-    grid: FloatArray,
-    starts: FloatArray | float,
-    criteria: tuple[Criterion, ...],
-    ranges: DelayRanges | None = None,
-) -> list[ValveScan]:
-    """Scan by several criteria, as :func:`scan_valve`, each stem simulated once."""
     ranges = ranges or data.delays
-    scans = [output_scans(data, model, orders, valve, c, ranges) for c in criteria]
+    scans = output_scans(data, model, orders, valve, criterion, ranges)
     return scan_stems(data, valve, grid, starts, scans, ranges)
 
 
@@ -216,30 +202,28 @@ def scan_stems(
     valve: int,
     grid: FloatArray,
     starts: FloatArray | float,
-    scans: Sequence[list[OutputScan]],
+    scans: Sequence[OutputScan],
     ranges: DelayRanges,
-) -> list[ValveScan]:
-    """Scan as :func:`scan_criteria` by criteria that stand, with one scan per output each."""
+) -> ValveScan:
+    """Scan as :func:`scan_valve` by a criterion that stands, one scan per output."""
     u = np.ascontiguousarray(data.u[valve])
     start = u[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
-    loss = np.zeros((len(scans), len(grid)))
-    best = np.zeros((len(scans), len(grid), len(data.y)), dtype=int)
-    moves = np.zeros(len(grid))
+    loss, moves = np.zeros(len(grid)), np.zeros(len(grid))
+    best = np.zeros((len(grid), len(data.y)), dtype=int)
 
     def scanned(rows: slice) -> None:
         stems = stem_steps(data.law, grid[rows], u, start[rows], data.further_of(valve))
         moves[rows] = stems.moves
-        for c, outputs in enumerate(scans):
-            for i, scan in enumerate(outputs):
-                energy, delays = scan.least_energy(stems)
-                best[c, rows, i] = delays + ranges[i][0]
-                loss[c, rows] += scan.count * np.log(energy / scan.count)
+        for i, scan in enumerate(scans):
+            energy, delays = scan.least_energy(stems)
+            best[rows, i] = delays + ranges[i][0]
+            loss[rows] += scan.count * np.log(energy / scan.count)
 
     shared = len(grid) * len(u) >= WORTHWHILE
     batch = min(BATCH, (len(grid) + 1) // 2) if shared else BATCH
     begins = range(0, len(grid), batch)
     together(*(partial(scanned, slice(begin, begin + batch)) for begin in begins))
-    return [ValveScan(grid, loss[c], best[c], moves) for c in range(len(scans))]
+    return ValveScan(grid, loss, best, moves)
 
 
 def with_delays(
