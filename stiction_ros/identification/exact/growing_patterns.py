@@ -68,7 +68,7 @@ def growing_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Mo
     lengths = window_lengths(first_window(data, orders, valve), data.y.shape[1])
 
     def search(begin: Beginning, count: int) -> PatternSearch:
-        window, shown = data.beginning(count), model.beginning(count)
+        window, shown = data.part(0, count), model.beginning(count)
         criterion = Criterion.ONE_STEP
         return PatternSearch(window, shown, orders, valve, data.delays, begin, criterion)
 

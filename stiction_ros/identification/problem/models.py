@@ -65,9 +65,9 @@ class Data:
     min_moves: int
     further: tuple[tuple[float, ...], ...] = ()
 
-    def beginning(self, count: int) -> Data:
-        """Return the first ``count`` samples."""
-        y, u = (np.ascontiguousarray(signal[:, :count]) for signal in (self.y, self.u))
+    def part(self, begin: int, end: int) -> Data:
+        """Return the samples from ``begin`` to before ``end``."""
+        y, u = (np.ascontiguousarray(signal[:, begin:end]) for signal in (self.y, self.u))
         return dataclasses.replace(self, y=y, u=u)
 
     def further_of(self, valve: int) -> tuple[float, ...]:
@@ -119,20 +119,22 @@ class ValveScan:
 
     Attributes:
         grid: rows (f_S, f_D), shape (G, 2).
+        starts: stem before the first sample minus first OP, %, shape (G,).
         loss: best over the delays, summed over outputs, shape (G,).
         delays: the best delay per output, shape (G, p).
         moves: shape (G,).
     """
 
     grid: FloatArray
+    starts: FloatArray
     loss: FloatArray
     delays: FloatArray
     moves: FloatArray
 
     def part(self, begin: int, end: int) -> ValveScan:
         """Return the rows from ``begin`` to before ``end``."""
-        rows = slice(begin, end)
-        return ValveScan(self.grid[rows], self.loss[rows], self.delays[rows], self.moves[rows])
+        columns = (getattr(self, field.name) for field in dataclasses.fields(self))
+        return ValveScan(*(column[begin:end] for column in columns))
 
     def best(self, count: int, min_moves: int, apart: float) -> list[int]:
         """Return up to ``count`` best rows at least ``apart`` from each other."""
@@ -207,12 +209,13 @@ def scan_stems(
 ) -> ValveScan:
     """Scan as :func:`scan_valve` by a criterion that stands, one scan per output."""
     u = np.ascontiguousarray(data.u[valve])
-    start = u[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
+    starts = np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
+    begins = u[0] + starts
     loss, moves = np.zeros(len(grid)), np.zeros(len(grid))
     best = np.zeros((len(grid), len(data.y)), dtype=int)
 
     def scanned(rows: slice) -> None:
-        stems = stem_steps(data.law, grid[rows], u, start[rows], data.further_of(valve))
+        stems = stem_steps(data.law, grid[rows], u, begins[rows], data.further_of(valve))
         moves[rows] = stems.moves
         for i, scan in enumerate(scans):
             energy, delays = scan.least_energy(stems)
@@ -221,9 +224,9 @@ def scan_stems(
 
     shared = len(grid) * len(u) >= WORTHWHILE
     batch = min(BATCH, (len(grid) + 1) // 2) if shared else BATCH
-    begins = range(0, len(grid), batch)
-    together(*(partial(scanned, slice(begin, begin + batch)) for begin in begins))
-    return ValveScan(grid, loss, best, moves)
+    batches = (slice(at, at + batch) for at in range(0, len(grid), batch))
+    together(*(partial(scanned, rows) for rows in batches))
+    return ValveScan(grid, starts, loss, best, moves)
 
 
 def with_delays(

@@ -47,7 +47,7 @@ def loop() -> tuple[Data, Model, Orders]:
 
 def on_window(loop: tuple[Data, Model, Orders], count: int, begin: Beginning) -> PatternSearch:
     data, model, orders = loop
-    part, shown = data.beginning(count), model.beginning(count)
+    part, shown = data.part(0, count), model.beginning(count)
     return PatternSearch(part, shown, orders, 0, data.delays, begin, Criterion.ONE_STEP)
 
 
