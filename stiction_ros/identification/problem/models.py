@@ -287,7 +287,10 @@ def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model
         zero = np.zeros((m, 2))
         delays = tuple((data.delay[0],) * m for _ in range(p))
         base = Model(zero, np.zeros(m), data.u.copy(), delays, ())
-    model = refit(data, _one_step_delays(data, base, orders), orders, warm=False)
+    for j in range(m) if data.delay[0] < data.delay[1] else ():
+        delays = _best_delays(data, base, orders, j, Criterion.ONE_STEP)
+        base = dataclasses.replace(base, delays=delays)
+    model = refit(data, base, orders, warm=False)
     tried = {model.delays}
     for _ in range(3):
         before = model.loss
@@ -297,23 +300,20 @@ def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model
     return model
 
 
-def _one_step_delays(data: Data, model: Model, orders: Orders) -> Model:
-    """Return the model with each channel's delay at the least one-step SE, one after another."""
-    low, high = data.delay
-    if low == high:
-        return model
-    for j in range(len(data.u)):
-        scans = output_scans(data, model, orders, j, Criterion.ONE_STEP, data.delays)
-        stem = StepSignals.of(model.stems[j][:, None])
-        best = [low + int(scan.energy(stem)[0].argmin()) for scan in scans]
-        model = dataclasses.replace(model, delays=with_delays(model.delays, j, best))
-    return model
+def _best_delays(
+    data: Data, model: Model, orders: Orders, valve: int, criterion: Criterion
+) -> AllDelays:
+    """Return the model's delays with those of one valve at the least SE."""
+    scans = output_scans(data, model, orders, valve, criterion, data.delays)
+    stem = StepSignals.of(model.stems[valve][:, None])
+    best = [data.delay[0] + int(scan.energy(stem)[0].argmin()) for scan in scans]
+    return with_delays(model.delays, valve, best)
 
 
 def improve_delays(
     data: Data, model: Model, orders: Orders, tried: set[AllDelays] | None = None
 ) -> Model:
-    """Scan all delays of every channel with friction fixed; keep what the exact fit favours.
+    """Scan all delays of every channel with the stems fixed; keep what the exact fit favours.
 
     Args:
         tried: delays whose fits are known to be no better; what is fitted here is added.
@@ -323,14 +323,11 @@ def improve_delays(
     tried = set() if tried is None else tried
     for valve in range(len(data.u)):
         for criterion in (Criterion.FREE_RUN, Criterion.INNOVATIONS):
-            friction = model.friction[valve][None, :]
-            scan = scan_valve(data, model, orders, valve, friction, model.start[valve], criterion)
-            delays = with_delays(model.delays, valve, scan.delays[0])
+            delays = _best_delays(data, model, orders, valve, criterion)
             if delays == model.delays or delays in tried:
                 continue
             tried.add(delays)
-            start, best = float(model.start[valve]), scan.delays[0]
-            rival = with_valve(data, model, orders, valve, friction[0], start, best, warm=False)
+            rival = refit(data, dataclasses.replace(model, delays=delays), orders, warm=False)
             model = min(model, rival, key=lambda candidate: candidate.loss)
     return model
 
