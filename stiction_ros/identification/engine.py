@@ -67,9 +67,10 @@ def identify_exact(
     report(0.02)
     require_cells(data.law)
     part = liveliest_part(data)
-    orders, outcome, table = choose(part, options)
+    orders, linear, outcome, table = choose(part, options)
     report(0.4)
-    linear = linear_model(data, orders)  # of all, where a part was searched
+    if part is not data:
+        linear = linear_model(data, orders)
     model = carried_over(data, linear, outcome.model, orders)
     report(0.5)
     model, delays = settle_delays(data, model, orders)
@@ -141,14 +142,14 @@ def judged_valves(
 
 def choose(
     data: Data, options: IdentificationOptions
-) -> tuple[Orders, SearchOutcome, tuple[OrderRow, ...]]:
-    """Return orders, the model with friction and all orders tried."""
+) -> tuple[Orders, Model, SearchOutcome, tuple[OrderRow, ...]]:
+    """Return orders, the models without and with friction, and all orders tried."""
     orders_list = windows(options)
     start = orders_list[len(orders_list) // 2]
     linear = linear_model(data, start)
     found = search(data, linear, start)
     if len(orders_list) == 1:
-        return start, found, (order_row(start, found.model),)
+        return start, linear, found, (order_row(start, found.model),)
     models = together(*(partial(linear_model, data, n, found.model) for n in orders_list))
     rivals = list(zip(orders_list, models, strict=True))
     table = tuple(order_row(*rival) for rival in rivals)
@@ -158,7 +159,7 @@ def choose(
         found = search(data, linear, orders, growing=False)
         best = improve(data, best, orders)
     better = min(best, found.model, key=lambda candidate: candidate.loss)
-    return orders, dataclasses.replace(found, model=better), table
+    return orders, linear, dataclasses.replace(found, model=better), table
 
 
 def order_row(orders: Orders, model: Model) -> OrderRow:
