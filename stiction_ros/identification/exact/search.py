@@ -130,27 +130,21 @@ def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) ->
     if growing and data.law is HeStiction and data.y.shape[1] <= LONGEST:
         piece_by_piece = [partial(growing_patterns, data, model, orders, valve)]
 
-    def from_scan(criterion: Criterion) -> Model:
-        scan = first.scans[criterion]
+    def from_scan(scan: ValveScan, criterion: Criterion) -> Model:
         count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
-        parents = scan.grid[scan.best(count, data.min_moves, 0.5 * APART * limit)]
-        return descend(data, model, orders, valve, parents, criterion, data.delays, False)
-
-    def from_elsewhere(other: ValveScan) -> Model:
-        chosen = other.best(FIRST_PARENTS, data.min_moves, 0.5 * APART * limit)
+        chosen = scan.best(count, data.min_moves, 0.5 * APART * limit)
         if not chosen:
             return model
         start = model.start.copy()
-        start[valve] = other.starts[chosen[0]]
-        moved, parents = dataclasses.replace(model, start=start), other.grid[chosen]
-        ranges, criterion = data.delays, Criterion.ONE_STEP
-        return descend(data, moved, orders, valve, parents, criterion, ranges, False)
+        start[valve] = scan.starts[chosen[0]]
+        moved, parents = dataclasses.replace(model, start=start), scan.grid[chosen]
+        return descend(data, moved, orders, valve, parents, criterion, data.delays, False)
 
     rivals = together(
         *piece_by_piece,
-        *(partial(from_scan, criterion) for criterion in first.scans),
+        *(partial(from_scan, scan, criterion) for criterion, scan in first.scans.items()),
         lambda: _from_fitted(data, first, orders),
-        *(partial(from_elsewhere, other) for other in first.better_beginnings),
+        *(partial(from_scan, other, Criterion.ONE_STEP) for other in first.better_beginnings),
     )
     promising = sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]
     closer = together(
