@@ -14,7 +14,6 @@ from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.exact.long_records import carried_over, liveliest_part
 from stiction_ros.identification.exact.search import SearchOutcome, improve, search
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.inference.certificate import certificates
 from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.intervals import friction_intervals
 from stiction_ros.identification.inference.verdict import evidence, is_deadband, judge
@@ -76,7 +75,8 @@ def identify_exact(
     model, delays = settle_delays(data, model, orders)
     valves, final = judged_valves(record, data, model, linear, orders, options)
     report(1.0)
-    told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
+    exact = [certificate(valve) for valve in valves if valve.static_friction > 0.0]
+    told = (*ambiguities(record, delays, outcome.rivals), *exact)
     plain = conclude(record, data, Findings(final, valves, table, told), 0.0)
     answer = explained(record, plain, close_loop(record, plain))
     return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
@@ -186,6 +186,19 @@ def ambiguities(
         for chosen, other in valves
     ]
     return tuple(told)
+
+
+def certificate(valve: ValveEstimate) -> str:
+    """Return a sentence on what of a friction is exact and what was searched."""
+    patterns = int(valve.evidence["patterns"])
+    head = f"friction of {valve.name} (law {valve.law})"
+    if not patterns:
+        return f"{head}: searched on grids only, no switching pattern was enumerated"
+    if valve.evidence["patterns_closed"]:
+        reach = "exact among them, all at their edge are rejected"
+    else:
+        reach = "exact among them, but not all at their edge are rejected"
+    return f"{head}: {patterns} switching patterns enumerated round it; {reach}"
 
 
 def linear_rivals(
