@@ -14,7 +14,6 @@ from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.exact.long_records import carried_over, liveliest_part
 from stiction_ros.identification.exact.search import SearchOutcome, improve, search
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.inference.certificate import certificates
 from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.intervals import friction_intervals
 from stiction_ros.identification.inference.verdict import evidence, is_deadband, judge
@@ -67,15 +66,17 @@ def identify_exact(
     report(0.02)
     require_cells(data.law)
     part = liveliest_part(data)
-    orders, outcome, table = choose(part, options)
+    orders, linear, outcome, table = choose(part, options)
     report(0.4)
-    linear = linear_model(data, orders)  # of all, where a part was searched
+    if part is not data:
+        linear = linear_model(data, orders)
     model = carried_over(data, linear, outcome.model, orders)
     report(0.5)
     model, delays = settle_delays(data, model, orders)
     valves, final = judged_valves(record, data, model, linear, orders, options)
     report(1.0)
-    told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
+    exact = [certificate(valve) for valve in valves if valve.static_friction > 0.0]
+    told = (*ambiguities(record, delays, outcome.rivals), *exact)
     plain = conclude(record, data, Findings(final, valves, table, told), 0.0)
     answer = explained(record, plain, close_loop(record, plain))
     return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
@@ -98,7 +99,7 @@ def judged_valves(
         lambda: [linear_rivals(data, model, linear, orders, j) for j in range(len(data.u))],
         lambda: friction_intervals(data, model, orders, 0, options.confidence),
     )
-    found = []
+    valves = []
     for j in range(len(data.u)):
         intervals = friction_intervals(data, model, orders, j, options.confidence) if j else first
         model = intervals.model
@@ -109,30 +110,46 @@ def judged_valves(
         static = (0.0, intervals.static[1]) if doubted else intervals.static
         dynamic = (0.0, intervals.dynamic[1]) if doubted else intervals.dynamic
         verdict = judge(figures, static, dynamic, span, options)
-        estimate = (intervals.static_estimate, intervals.dynamic_estimate)
-        if doubted and (figures["delta_bic"] < 0.0 or verdict is VerdictKind.HEALTHY):
-            estimate = (0.0, 0.0)
+        healthy = verdict is VerdictKind.HEALTHY
+        f_s, f_d = intervals.static_estimate, intervals.dynamic_estimate
+        if doubted and (figures["delta_bic"] < 0.0 or healthy):
+            f_s = f_d = 0.0
             model = without_friction(data, model, orders, j)
         if record.stem is not None:
             error = model.stems[j] + record.op[:, j].mean() - record.stem[:, j]
             figures["stem_error"] = float(np.mean(error**2))
         figures["patterns"] = float(intervals.patterns)
         figures["patterns_closed"] = float(intervals.closed)
-        found.append((estimate, static, dynamic, verdict, figures, intervals.profile))
-    valves = tuple(_valve(record, model, j, *entry, options) for j, entry in enumerate(found))
-    return valves, model
+        gains = figures["half_1"], figures["half_2"]
+        valve = ValveEstimate(
+            name=record.valves[j],
+            verdict=verdict,
+            law=options.first_law,
+            static_friction=f_s,
+            static_interval=(min(static[0], f_s), max(static[1], f_s)),
+            dynamic_friction=f_d,
+            dynamic_interval=(min(dynamic[0], f_d), max(dynamic[1], f_d)),
+            jump=0.0 if is_deadband(intervals.deadband_loss, static, dynamic) else f_s - f_d,
+            stem_start=float(record.op[0, j] + model.start[j]),
+            moves=int(np.count_nonzero(np.diff(model.stems[j]))),
+            evidence=figures,
+            profile=intervals.profile,
+            stability=Stability(halves(gains, options.bic_margin if healthy else None)),
+        )
+        valves.append(valve)
+    return tuple(valves), model
 
 
 def choose(
     data: Data, options: IdentificationOptions
-) -> tuple[Orders, SearchOutcome, tuple[OrderRow, ...]]:
-    """Return orders, the model with friction and all orders tried."""
+) -> tuple[Orders, Model, SearchOutcome, tuple[OrderRow, ...]]:
+    """Return orders, the models without and with friction, and all orders tried."""
     orders_list = windows(options)
     start = orders_list[len(orders_list) // 2]
     linear = linear_model(data, start)
     found = search(data, linear, start)
     if len(orders_list) == 1:
-        return start, found, (order_row(start, found.model),)
+        return start, linear, found, (order_row(start, found.model),)
     models = together(*(partial(linear_model, data, n, found.model) for n in orders_list))
     rivals = list(zip(orders_list, models, strict=True))
     table = tuple(order_row(*rival) for rival in rivals)
@@ -142,7 +159,7 @@ def choose(
         found = search(data, linear, orders, growing=False)
         best = improve(data, best, orders)
     better = min(best, found.model, key=lambda candidate: candidate.loss)
-    return orders, dataclasses.replace(found, model=better), table
+    return orders, linear, dataclasses.replace(found, model=better), table
 
 
 def order_row(orders: Orders, model: Model) -> OrderRow:
@@ -169,6 +186,19 @@ def ambiguities(
         for chosen, other in valves
     ]
     return tuple(told)
+
+
+def certificate(valve: ValveEstimate) -> str:
+    """Return a sentence on what of a friction is exact and what was searched."""
+    patterns = int(valve.evidence["patterns"])
+    head = f"friction of {valve.name} (law {valve.law})"
+    if not patterns:
+        return f"{head}: searched on grids only, no switching pattern was enumerated"
+    if valve.evidence["patterns_closed"]:
+        reach = "exact among them, all at their edge are rejected"
+    else:
+        reach = "exact among them, but not all at their edge are rejected"
+    return f"{head}: {patterns} switching patterns enumerated round it; {reach}"
 
 
 def linear_rivals(
@@ -198,35 +228,4 @@ def without_friction(data: Data, model: Model, orders: Orders, valve: int) -> Mo
     friction[valve], start[valve], stems[valve] = 0.0, 0.0, data.u[valve]
     return refit(
         data, dataclasses.replace(model, friction=friction, start=start, stems=stems), orders
-    )
-
-
-def _valve(
-    record: Record,
-    model: Model,
-    j: int,
-    estimate: tuple[float, float],
-    static: tuple[float, float],
-    dynamic: tuple[float, float],
-    verdict: VerdictKind,
-    figures: dict[str, float],
-    profile: tuple[tuple[float, float], ...],
-    options: IdentificationOptions,
-) -> ValveEstimate:
-    f_s, f_d = estimate
-    unheard = options.bic_margin if verdict is VerdictKind.HEALTHY else None
-    return ValveEstimate(
-        name=record.valves[j],
-        verdict=verdict,
-        law=options.first_law,
-        static_friction=f_s,
-        static_interval=(min(static[0], f_s), max(static[1], f_s)),
-        dynamic_friction=f_d,
-        dynamic_interval=(min(dynamic[0], f_d), max(dynamic[1], f_d)),
-        jump=0.0 if is_deadband(figures["deadband_loss"], static, dynamic) else f_s - f_d,
-        stem_start=float(record.op[0, j] + model.start[j]),
-        moves=int(np.count_nonzero(np.diff(model.stems[j]))),
-        evidence=figures,
-        profile=profile,
-        stability=Stability(halves((figures["half_1"], figures["half_2"]), unheard)),
     )

@@ -33,7 +33,6 @@ class Accepted:
         static, dynamic, band: hulls of f_S, f_D and f_S + f_D of what is not rejected.
         gain: −2 log of the marginal likelihood that the friction of this valve adds to a model in
             which it has none.
-        none: whether a valve without friction is not rejected.
         deadband_loss: by how much the best f_D = f_S is worse than the best.
         material_gain: what the best friction adds whose band is above :data:`HARMLESS`; below 0
             where all such are less likely than none.
@@ -44,7 +43,6 @@ class Accepted:
     dynamic: Interval
     band: Interval
     gain: float
-    none: bool
     deadband_loss: float
     material_gain: float
     profile: tuple[tuple[float, float], ...]
@@ -85,7 +83,6 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
         dynamic=(float(dynamic.min()), float(dynamic.max())),
         band=(float(band.min()), float(band.max())),
         gain=gain,
-        none=gain <= slack,
         deadband_loss=float(lost[flat].min(initial=np.inf)),
         material_gain=found.without[valve].loss - material,
         profile=_profile(rows[:, 0], lost),

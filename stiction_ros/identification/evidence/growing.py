@@ -12,11 +12,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import Candidate, Judge, rows_apart
 from stiction_ros.identification.evidence.fit_problem import LIMIT, Problem
 from stiction_ros.identification.evidence.output_fit import OutputFit
-from stiction_ros.identification.exact.growing_windows import samples_of_turns
 from stiction_ros.identification.friction.grid import even_grid
 
 TURNS = 6  # of OP in the first beginning
@@ -89,3 +89,11 @@ def _first(problem: Problem, valve: int) -> int:
     samples = samples_of_turns(problem.op[valve], TURN, TURNS)
     rows = problem.rows if samples is None else (samples - 1) // problem.rate + 1
     return max(min(rows, problem.rows // MOST), LEAST, problem.rows // PART)
+
+
+def samples_of_turns(op: FloatArray, band: float, turns: int) -> int | None:
+    """Return how many samples of OP hold so many reversals by ``band``; None: there are fewer."""
+    moves = np.diff(HeStiction.simulate_grid(np.array([[band, band]]), op, float(op[0]))[:, 0])
+    at = np.flatnonzero(moves)
+    reversed_at = at[1:][np.sign(moves[at[1:]]) != np.sign(moves[at[:-1]])]
+    return int(reversed_at[turns - 1]) + 1 if len(reversed_at) >= turns else None

@@ -19,11 +19,9 @@ import numpy as np
 from stiction_ros.effects import FrictionLaw
 from stiction_ros.identification.evidence.accepted import MISFIT, accepted
 from stiction_ros.identification.evidence.candidate import Candidate
-from stiction_ros.identification.evidence.rates import SEEDS, Look, agreement
+from stiction_ros.identification.evidence.rates import Look, agreement
 from stiction_ros.identification.evidence.search import (
-    APART,
     Found,
-    heads,
     search_again,
     search_law,
 )
@@ -90,7 +88,7 @@ def _searched(look: Look, valve: int, law: Law, seeds: Sequence[Candidate]) -> F
 
 
 def _heads(found: Iterable[Found], valve: int) -> list[Candidate]:
-    return [head for one in found for head in heads(one, valve, SEEDS, APART)]
+    return [head for one in found for head in one.heads(valve)]
 
 
 def _alike(look: Look, valve: int, law: Law, best: Candidate) -> bool:

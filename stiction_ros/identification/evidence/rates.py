@@ -31,10 +31,8 @@ from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import settled
 from stiction_ros.identification.evidence.outside_waves import outside_wave
 from stiction_ros.identification.evidence.search import (
-    APART,
     Found,
     better,
-    heads,
     search,
     search_again,
 )
@@ -47,7 +45,6 @@ from stiction_ros.records.record import Record
 RATES = (1, 2, 4, 8)
 LEAST_ROWS = 120  # that are left at a rate
 RATE_ROUNDS = 2  # in which rates hand each other what they found
-SEEDS = 2  # frictions of each rate that are tried at the others
 OLDEST = 2.0  # rows from one report to the next, at most, of a rate that may call a valve healthy
 STRAIGHT = 1e-7  # of the range of PV: less is no bend
 ALIKE = 1.5
@@ -192,7 +189,7 @@ def looks(record: Record, options: IdentificationOptions) -> tuple[Look, ...]:
     gains: list[float | None] = [None] * len(problems)
     if any(waves):
         beside = [problem.with_waves([w.lines if w else () for w in waves]) for problem in problems]
-        also = _searched(beside, _all_heads(problems, found))
+        also = _searched(beside, [head for one in found for head in one.heads()])
         for k, (plain, waved) in enumerate(zip(found, also, strict=True)):
             gains[k] = max(plain.ideal.loss - waved.ideal.loss, 0.0)
             found[k] = better(plain, waved)
@@ -211,15 +208,11 @@ def _searched(problems: Sequence[Problem], seeds: Sequence[Candidate] = ()) -> l
     """Return what is found at each rate, what is best at one tried at the others, and ``seeds``."""
     found = [search(problem) for problem in problems]
     for _ in range(RATE_ROUNDS):
-        heads_of = [_heads(*one) for one in zip(problems, found, strict=True)]
+        heads_of = [one.heads() for one in found]
         for k, problem in enumerate(problems):
             others = [seed for other, row in enumerate(heads_of) if other != k for seed in row]
             found[k] = search_again(problem, found[k], [*others, *seeds])
     return found
-
-
-def _all_heads(problems: Sequence[Problem], found: Sequence[Found]) -> list[Candidate]:
-    return [head for one in zip(problems, found, strict=True) for head in _heads(*one)]
 
 
 def liveliest(record: Record) -> Record:
@@ -244,11 +237,6 @@ def samples_between_reports(record: Record) -> float:
     """
     bends = np.abs(np.diff(record.pv, 2, axis=0)) > STRAIGHT * np.ptp(record.pv, axis=0)
     return float(len(record) / max(bends.sum(axis=0).max(initial=0), 1))
-
-
-def _heads(problem: Problem, found: Found) -> list[Candidate]:
-    """Return the candidates of one rate that are worth a trial at the others."""
-    return [one for j in range(len(problem.op)) for one in heads(found, j, SEEDS, APART)]
 
 
 def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:

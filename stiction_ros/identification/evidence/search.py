@@ -38,6 +38,7 @@ DRIFT = 0.95
 takes what a friction leaves for noise, and under that noise all frictions look alike."""
 NEAR = 0.01  # by which seeds from elsewhere differ
 HEADS = 3  # candidates that are polished
+HANDED = 2  # frictions of a valve that are tried elsewhere, as at the other rates
 STEP = 0.03  # of the span: first step of the polish
 FINEST = 1e-4
 SHRINK = 2.5
@@ -66,6 +67,14 @@ class Found:
     ideal: Candidate
     without: tuple[Candidate, ...]
     met: tuple[Candidate, ...]
+
+    def heads(self, *valves: int) -> list[Candidate]:
+        """Return the best with friction of each of ``valves``, none for all, to try elsewhere."""
+        found = []
+        for valve in valves or range(len(self.without)):
+            rubbing = [one for one in self.met if one.friction[valve, 0] > 0.0]
+            found += candidates_apart(rubbing, valve, HANDED, APART)
+        return found
 
 
 class _Valve:
@@ -285,12 +294,6 @@ def better(plain: Found, other: Found) -> Found:
     pairs = zip(plain.without, other.without, strict=True)
     without = tuple(min(pair, key=lambda candidate: candidate.loss) for pair in pairs)
     return dataclasses.replace(best, without=without)
-
-
-def heads(found: Found, valve: int, count: int, distance: float) -> list[Candidate]:
-    """Return the best candidates with friction of a valve, apart by ``distance``."""
-    met = [one for one in found.met if one.friction[valve, 0] > 0.0]
-    return candidates_apart(met, valve, count, distance)
 
 
 def _concluded(

@@ -19,13 +19,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.exact.growing_windows import (
-    beginning_of_data,
-    beginning_of_model,
-    sample_of_turn,
-    shortest_window,
-    window_lengths,
-)
+from stiction_ros.identification.evidence.growing import TURN, samples_of_turns
 from stiction_ros.identification.exact.pattern_search import PatternSearch, points_of
 from stiction_ros.identification.friction.grid import even_grid
 from stiction_ros.identification.problem.models import Criterion, Data, Model, with_valve
@@ -34,6 +28,7 @@ from stiction_ros.identification.switching.patterns import Beginning, cells_at
 from stiction_ros.identification.switching.scan import PatternScan
 
 LONGEST = 1500  # samples of a record that is searched so
+GROWTH = 1.2  # of a window to the next
 FIRST_TURNS = 3  # reversals of OP in the first window
 FIRST_SLIPS = 3  # that are tried
 STEPS = 60  # of the first window's grid
@@ -69,14 +64,11 @@ def growing_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Mo
     Args:
         model: gives the stems of the other valves.
     """
-    samples, apart = data.y.shape[1], BIN * float(data.limit[valve])
-    lags = data.delay[1] - data.delay[0] + orders.input  # in each, the first level is free
-    shortest = shortest_window(data, orders, lags)
-    first = max(sample_of_turn(data, valve, FIRST_TURNS), shortest)
-    lengths = window_lengths(min(first, samples), samples)
+    apart = BIN * float(data.limit[valve])
+    lengths = window_lengths(first_window(data, orders, valve), data.y.shape[1])
 
     def search(begin: Beginning, count: int) -> PatternSearch:
-        window, shown = beginning_of_data(data, count), beginning_of_model(model, count)
+        window, shown = data.part(0, count), model.beginning(count)
         criterion = Criterion.ONE_STEP
         return PatternSearch(window, shown, orders, valve, data.delays, begin, criterion)
 
@@ -87,6 +79,23 @@ def growing_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Mo
     for count in lengths[1:]:
         kept = [divided(branch, search(branch.begin, count)) for branch in thinned(kept, apart)]
     return _fitted(data, model, orders, valve, kept)
+
+
+def first_window(data: Data, orders: Orders, valve: int) -> int:
+    """Return how many samples hold the first turns of OP and suffice for a fit."""
+    lags = data.delay[1] - data.delay[0] + orders.input  # in each, the first level is free
+    free = 2 * orders.output + len(data.u) * orders.input + orders.noise + 3 + lags
+    u = data.u[valve]
+    turned = samples_of_turns(u, TURN * float(data.limit[valve]), FIRST_TURNS) or len(u)
+    return min(max(turned, orders.first + 5 * free), len(u))
+
+
+def window_lengths(first: int, samples: int) -> list[int]:
+    """Return the lengths of the windows, from ``first`` up to the whole record."""
+    counts = [first]
+    while counts[-1] < samples:
+        counts.append(min(samples, int(GROWTH * counts[-1]) + 1))
+    return counts
 
 
 def first_slips(u: FloatArray) -> list[Beginning]:

@@ -25,10 +25,8 @@ def liveliest_part(data: Data) -> Data:
     samples = data.u.shape[1]
     if samples <= PART:
         return data
-    part = slice(liveliest_begin(data.u / data.u.std(axis=1, keepdims=True)), None)
-    return dataclasses.replace(
-        data, y=data.y[:, part][:, :PART].copy(), u=data.u[:, part][:, :PART].copy()
-    )
+    begin = liveliest_begin(data.u / data.u.std(axis=1, keepdims=True))
+    return data.part(begin, begin + PART)
 
 
 def liveliest_begin(op: FloatArray) -> int:

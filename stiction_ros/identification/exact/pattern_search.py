@@ -72,7 +72,7 @@ class PatternSearch:
 
     def scan(self, grid: FloatArray, starts: FloatArray | float) -> ValveScan:
         """Scan rows (f_S, f_D), shape (G, 2), by the same criterion, see :func:`scan_valve`."""
-        return scan_stems(self.data, self.valve, grid, starts, [self.scans], self.ranges)[0]
+        return scan_stems(self.data, self.valve, grid, starts, self.scans, self.ranges)
 
     def evaluate(self, cells: Cells) -> PatternScan:
         """Return the loss of every cell at its best f_D.

@@ -10,6 +10,7 @@ the best switching pattern of its neighbourhood (:mod:`.pattern_search`).
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping
 from functools import partial
 
@@ -37,7 +38,6 @@ from stiction_ros.identification.problem.models import (
     DelayRanges,
     Model,
     ValveScan,
-    scan_criteria,
     scan_valve,
     with_valve,
 )
@@ -65,24 +65,11 @@ FURTHER = 2  # beginnings that are searched further
 
 
 @dataclasses.dataclass(frozen=True)
-class Elsewhere:
-    """One scan of stems that begin away from OP.
-
-    Until a valve first slips its stem is where it was left. When that takes long, the right
-    friction is found only from the right beginning.
-
-    Attributes:
-        starts: stem before the first sample minus first OP, %, shape (G,).
-        scan: of these.
-    """
-
-    starts: FloatArray
-    scan: ValveScan
-
-
-@dataclasses.dataclass(frozen=True)
 class FirstScan:
     """The whole triangle of one valve under three criteria.
+
+    Until a valve first slips its stem is where it was left. When that takes long, the right
+    friction is found only from the right beginning, so other beginnings are scanned as well.
 
     Attributes:
         model: the model whose other valves and noise the scans saw.
@@ -94,22 +81,22 @@ class FirstScan:
     model: Model
     valve: int
     scans: Mapping[Criterion, ValveScan]
-    elsewhere: tuple[Elsewhere, ...]
+    elsewhere: tuple[ValveScan, ...]
 
     @property
     def gain(self) -> float:
         """By how much the best friction beats none, in the criterion where it does most."""
         one_step = float(self.scans[Criterion.ONE_STEP].loss[0])
         gains = [float(scan.loss[0] - scan.loss[1:].min()) for scan in self.scans.values()]
-        gains += [one_step - float(other.scan.loss.min()) for other in self.elsewhere]
+        gains += [one_step - float(other.loss.min()) for other in self.elsewhere]
         return max(gains)
 
     @property
-    def better_beginnings(self) -> list[Elsewhere]:
+    def better_beginnings(self) -> list[ValveScan]:
         """The best scans from elsewhere that beat all that begin at OP."""
         least = float(self.scans[Criterion.ONE_STEP].loss.min()) - EQUAL
-        better = [other for other in self.elsewhere if other.scan.loss.min() < least]
-        return sorted(better, key=lambda other: float(other.scan.loss.min()))[:FURTHER]
+        better = [other for other in self.elsewhere if other.loss.min() < least]
+        return sorted(better, key=lambda other: float(other.loss.min()))[:FURTHER]
 
 
 def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstScan:
@@ -123,17 +110,13 @@ def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstSca
     everywhere = scan_valve(
         data, model, orders, valve, grid, np.concatenate(starts), Criterion.ONE_STEP
     )
-    ends = np.cumsum([len(part) for part in starts])
-    elsewhere = tuple(
-        Elsewhere(part, everywhere.part(int(end) - len(part), int(end)))
-        for part, end in zip(starts[1:], ends[1:], strict=True)
-    )
+    ends = np.cumsum([len(part) for part in starts]).tolist()
+    elsewhere = tuple(everywhere.part(*rows) for rows in itertools.pairwise(ends))
     coarse = np.vstack([np.zeros((1, 2)), coarse_grid(limit)])
-    filtered = (Criterion.FREE_RUN, Criterion.INNOVATIONS)
-    scans = scan_criteria(data, model, orders, valve, coarse, start, filtered)
-    by_criterion = dict(zip(filtered, scans, strict=True))
-    one_step = {Criterion.ONE_STEP: everywhere.part(0, len(fine))}
-    return FirstScan(model, valve, one_step | by_criterion, elsewhere)
+    scans = {Criterion.ONE_STEP: everywhere.part(0, len(fine))}
+    for criterion in (Criterion.FREE_RUN, Criterion.INNOVATIONS):
+        scans[criterion] = scan_valve(data, model, orders, valve, coarse, start, criterion)
+    return FirstScan(model, valve, scans, elsewhere)
 
 
 def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) -> Model:
@@ -147,27 +130,21 @@ def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) ->
     if growing and data.law is HeStiction and data.y.shape[1] <= LONGEST:
         piece_by_piece = [partial(growing_patterns, data, model, orders, valve)]
 
-    def from_scan(criterion: Criterion) -> Model:
-        scan = first.scans[criterion]
+    def from_scan(scan: ValveScan, criterion: Criterion) -> Model:
         count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
-        parents = scan.grid[scan.best(count, data.min_moves, 0.5 * APART * limit)]
-        return descend(data, model, orders, valve, parents, criterion, data.delays, False)
-
-    def from_elsewhere(other: Elsewhere) -> Model:
-        chosen = other.scan.best(FIRST_PARENTS, data.min_moves, 0.5 * APART * limit)
+        chosen = scan.best(count, data.min_moves, 0.5 * APART * limit)
         if not chosen:
             return model
         start = model.start.copy()
-        start[valve] = other.starts[chosen[0]]
-        moved, parents = dataclasses.replace(model, start=start), other.scan.grid[chosen]
-        ranges, criterion = data.delays, Criterion.ONE_STEP
-        return descend(data, moved, orders, valve, parents, criterion, ranges, False)
+        start[valve] = scan.starts[chosen[0]]
+        moved, parents = dataclasses.replace(model, start=start), scan.grid[chosen]
+        return descend(data, moved, orders, valve, parents, criterion, data.delays, False)
 
     rivals = together(
         *piece_by_piece,
-        *(partial(from_scan, criterion) for criterion in first.scans),
+        *(partial(from_scan, scan, criterion) for criterion, scan in first.scans.items()),
         lambda: _from_fitted(data, first, orders),
-        *(partial(from_elsewhere, other) for other in first.better_beginnings),
+        *(partial(from_scan, other, Criterion.ONE_STEP) for other in first.better_beginnings),
     )
     promising = sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]
     closer = together(

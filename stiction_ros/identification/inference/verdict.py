@@ -101,8 +101,10 @@ def judge(
         and min(figures["half_1"], figures["half_2"]) > 0.0
     )
     if believed and static[0] > options.negligible_share * span:
-        seen = figures["moves"] >= options.min_moves
-        return kind_of(figures["deadband_loss"], static, dynamic) if seen else VerdictKind.UNDECIDED
+        if figures["moves"] < options.min_moves:
+            return VerdictKind.UNDECIDED
+        deadband = is_deadband(figures["deadband_loss"], static, dynamic)
+        return VerdictKind.BACKLASH if deadband else VerdictKind.STICKY
     if static[1] <= negligible and figures["moves"] >= options.min_moves:
         return VerdictKind.HEALTHY
     return VerdictKind.UNDECIDED
@@ -118,9 +120,3 @@ def is_deadband(deadband_loss: float, static: Interval, dynamic: Interval) -> bo
     """
     jump, band = static[1] - dynamic[0], static[1] + dynamic[0]
     return deadband_loss < DEADBAND and jump <= SMALL_JUMP * band
-
-
-def kind_of(deadband_loss: float, static: Interval, dynamic: Interval) -> VerdictKind:
-    """Return what friction is called, by :func:`is_deadband`."""
-    deadband = is_deadband(deadband_loss, static, dynamic)
-    return VerdictKind.BACKLASH if deadband else VerdictKind.STICKY

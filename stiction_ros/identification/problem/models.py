@@ -65,6 +65,11 @@ class Data:
     min_moves: int
     further: tuple[tuple[float, ...], ...] = ()
 
+    def part(self, begin: int, end: int) -> Data:
+        """Return the samples from ``begin`` to before ``end``."""
+        y, u = (np.ascontiguousarray(signal[:, begin:end]) for signal in (self.y, self.u))
+        return dataclasses.replace(self, y=y, u=u)
+
     def further_of(self, valve: int) -> tuple[float, ...]:
         """The law's further parameters at a valve."""
         return self.further[valve] if self.further else ()
@@ -93,6 +98,10 @@ class Model:
     delays: tuple[tuple[int, ...], ...]
     fits: tuple[OutputFit, ...]
 
+    def beginning(self, count: int) -> Model:
+        """Return the model with the first ``count`` samples of its stems."""
+        return dataclasses.replace(self, stems=np.ascontiguousarray(self.stems[:, :count]))
+
     @property
     def loss(self) -> float:
         """Sum over outputs of n log(mean squared innovation)."""
@@ -110,20 +119,22 @@ class ValveScan:
 
     Attributes:
         grid: rows (f_S, f_D), shape (G, 2).
+        starts: stem before the first sample minus first OP, %, shape (G,).
         loss: best over the delays, summed over outputs, shape (G,).
         delays: the best delay per output, shape (G, p).
         moves: shape (G,).
     """
 
     grid: FloatArray
+    starts: FloatArray
     loss: FloatArray
     delays: FloatArray
     moves: FloatArray
 
     def part(self, begin: int, end: int) -> ValveScan:
         """Return the rows from ``begin`` to before ``end``."""
-        rows = slice(begin, end)
-        return ValveScan(self.grid[rows], self.loss[rows], self.delays[rows], self.moves[rows])
+        columns = (getattr(self, field.name) for field in dataclasses.fields(self))
+        return ValveScan(*(column[begin:end] for column in columns))
 
     def best(self, count: int, min_moves: int, apart: float) -> list[int]:
         """Return up to ``count`` best rows at least ``apart`` from each other."""
@@ -183,22 +194,8 @@ def scan_valve(
         criterion: filter by 1, 1/A or D/A of the model's fits.
         ranges: delays scanned, one range per output; None is that of the data for all.
     """
-    return scan_criteria(data, model, orders, valve, grid, starts, (criterion,), ranges)[0]
-
-
-def scan_criteria(
-    data: Data,
-    model: Model,
-    orders: Orders,
-    valve: int,
-    grid: FloatArray,
-    starts: FloatArray | float,
-    criteria: tuple[Criterion, ...],
-    ranges: DelayRanges | None = None,
-) -> list[ValveScan]:
-    """Scan by several criteria, as :func:`scan_valve`, each stem simulated once."""
     ranges = ranges or data.delays
-    scans = [output_scans(data, model, orders, valve, c, ranges) for c in criteria]
+    scans = output_scans(data, model, orders, valve, criterion, ranges)
     return scan_stems(data, valve, grid, starts, scans, ranges)
 
 
@@ -207,30 +204,29 @@ def scan_stems(
     valve: int,
     grid: FloatArray,
     starts: FloatArray | float,
-    scans: Sequence[list[OutputScan]],
+    scans: Sequence[OutputScan],
     ranges: DelayRanges,
-) -> list[ValveScan]:
-    """Scan as :func:`scan_criteria` by criteria that stand, with one scan per output each."""
+) -> ValveScan:
+    """Scan as :func:`scan_valve` by a criterion that stands, one scan per output."""
     u = np.ascontiguousarray(data.u[valve])
-    start = u[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
-    loss = np.zeros((len(scans), len(grid)))
-    best = np.zeros((len(scans), len(grid), len(data.y)), dtype=int)
-    moves = np.zeros(len(grid))
+    starts = np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
+    begins = u[0] + starts
+    loss, moves = np.zeros(len(grid)), np.zeros(len(grid))
+    best = np.zeros((len(grid), len(data.y)), dtype=int)
 
     def scanned(rows: slice) -> None:
-        stems = stem_steps(data.law, grid[rows], u, start[rows], data.further_of(valve))
+        stems = stem_steps(data.law, grid[rows], u, begins[rows], data.further_of(valve))
         moves[rows] = stems.moves
-        for c, outputs in enumerate(scans):
-            for i, scan in enumerate(outputs):
-                energy, delays = scan.least_energy(stems)
-                best[c, rows, i] = delays + ranges[i][0]
-                loss[c, rows] += scan.count * np.log(energy / scan.count)
+        for i, scan in enumerate(scans):
+            energy, delays = scan.least_energy(stems)
+            best[rows, i] = delays + ranges[i][0]
+            loss[rows] += scan.count * np.log(energy / scan.count)
 
     shared = len(grid) * len(u) >= WORTHWHILE
     batch = min(BATCH, (len(grid) + 1) // 2) if shared else BATCH
-    begins = range(0, len(grid), batch)
-    together(*(partial(scanned, slice(begin, begin + batch)) for begin in begins))
-    return [ValveScan(grid, loss[c], best[c], moves) for c in range(len(scans))]
+    batches = (slice(at, at + batch) for at in range(0, len(grid), batch))
+    together(*(partial(scanned, rows) for rows in batches))
+    return ValveScan(grid, starts, loss, best, moves)
 
 
 def with_delays(
@@ -291,7 +287,10 @@ def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model
         zero = np.zeros((m, 2))
         delays = tuple((data.delay[0],) * m for _ in range(p))
         base = Model(zero, np.zeros(m), data.u.copy(), delays, ())
-    model = refit(data, _one_step_delays(data, base, orders), orders, warm=False)
+    for j in range(m) if data.delay[0] < data.delay[1] else ():
+        delays = _best_delays(data, base, orders, j, Criterion.ONE_STEP)
+        base = dataclasses.replace(base, delays=delays)
+    model = refit(data, base, orders, warm=False)
     tried = {model.delays}
     for _ in range(3):
         before = model.loss
@@ -301,23 +300,20 @@ def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model
     return model
 
 
-def _one_step_delays(data: Data, model: Model, orders: Orders) -> Model:
-    """Return the model with each channel's delay at the least one-step SE, one after another."""
-    low, high = data.delay
-    if low == high:
-        return model
-    for j in range(len(data.u)):
-        scans = output_scans(data, model, orders, j, Criterion.ONE_STEP, data.delays)
-        stem = StepSignals.of(model.stems[j][:, None])
-        best = [low + int(scan.energy(stem)[0].argmin()) for scan in scans]
-        model = dataclasses.replace(model, delays=with_delays(model.delays, j, best))
-    return model
+def _best_delays(
+    data: Data, model: Model, orders: Orders, valve: int, criterion: Criterion
+) -> AllDelays:
+    """Return the model's delays with those of one valve at the least SE."""
+    scans = output_scans(data, model, orders, valve, criterion, data.delays)
+    stem = StepSignals.of(model.stems[valve][:, None])
+    best = [data.delay[0] + int(scan.energy(stem)[0].argmin()) for scan in scans]
+    return with_delays(model.delays, valve, best)
 
 
 def improve_delays(
     data: Data, model: Model, orders: Orders, tried: set[AllDelays] | None = None
 ) -> Model:
-    """Scan all delays of every channel with friction fixed; keep what the exact fit favours.
+    """Scan all delays of every channel with the stems fixed; keep what the exact fit favours.
 
     Args:
         tried: delays whose fits are known to be no better; what is fitted here is added.
@@ -327,14 +323,11 @@ def improve_delays(
     tried = set() if tried is None else tried
     for valve in range(len(data.u)):
         for criterion in (Criterion.FREE_RUN, Criterion.INNOVATIONS):
-            friction = model.friction[valve][None, :]
-            scan = scan_valve(data, model, orders, valve, friction, model.start[valve], criterion)
-            delays = with_delays(model.delays, valve, scan.delays[0])
+            delays = _best_delays(data, model, orders, valve, criterion)
             if delays == model.delays or delays in tried:
                 continue
             tried.add(delays)
-            start, best = float(model.start[valve]), scan.delays[0]
-            rival = with_valve(data, model, orders, valve, friction[0], start, best, warm=False)
+            rival = refit(data, dataclasses.replace(model, delays=delays), orders, warm=False)
             model = min(model, rival, key=lambda candidate: candidate.loss)
     return model
 

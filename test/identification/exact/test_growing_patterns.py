@@ -20,10 +20,6 @@ from stiction_ros.identification.exact.growing_patterns import (
     growing_patterns,
     spread,
     thinned,
-)
-from stiction_ros.identification.exact.growing_windows import (
-    beginning_of_data,
-    beginning_of_model,
     window_lengths,
 )
 from stiction_ros.identification.exact.pattern_search import PatternSearch
@@ -51,9 +47,8 @@ def loop() -> tuple[Data, Model, Orders]:
 
 def on_window(loop: tuple[Data, Model, Orders], count: int, begin: Beginning) -> PatternSearch:
     data, model, orders = loop
-    shown, ranges = beginning_of_model(model, count), data.delays
-    part = beginning_of_data(data, count)
-    return PatternSearch(part, shown, orders, 0, ranges, begin, Criterion.ONE_STEP)
+    part, shown = data.part(0, count), model.beginning(count)
+    return PatternSearch(part, shown, orders, 0, data.delays, begin, Criterion.ONE_STEP)
 
 
 def branch_at(loop: tuple[Data, Model, Orders], count: int, point: FloatArray) -> Branch:

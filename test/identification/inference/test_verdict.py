@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from stiction_ros.effects import HeStiction
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
-from stiction_ros.identification.inference.verdict import DEADBAND, SMALL_JUMP, judge, kind_of
+from stiction_ros.identification.inference.verdict import DEADBAND, SMALL_JUMP, judge
 
 CLEAR = {"delta_bic": 60.0, "half_1": 30.0, "half_2": 30.0, "moves": 40.0, "deadband_loss": 50.0}
 STICKY, BACKLASH, HEALTHY, UNDECIDED = VerdictKind
@@ -61,11 +61,6 @@ def test_units_of_op_change_no_verdict_beyond_the_absolute_limit(
     near = min(abs(low - 0.6), abs(low + more - 0.6)) < 1e-9
     near = near or abs(low + more - 0.5 * low - SMALL_JUMP * (1.5 * low + more)) < 1e-9
     assert near or said is scaled
-
-
-@given(st.floats(0.0, 1e6), st.floats(0.0, 50.0), st.floats(0.0, 50.0))
-def test_friction_is_sticky_or_backlash(loss: float, dynamic: float, jump: float) -> None:
-    assert kind_of(loss, (0.0, dynamic + jump), (dynamic, 60.0)).has_friction
 
 
 @pytest.mark.parametrize("kind", list(VerdictKind))

@@ -1,13 +1,19 @@
 """The scan equals plain least squares, whatever the prefilter."""
 
+import dataclasses
+
 import numpy as np
 import pytest
+import simulated_loops as loops
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
+from stiction_ros.identification import IdentificationOptions
 from stiction_ros.identification.kernels.delay import delay_room, pattern_energy
+from stiction_ros.identification.problem.models import Model, linear_model, refit
 from stiction_ros.identification.problem.output_error import Orders
+from stiction_ros.identification.problem.preparation import prepare, window
 from stiction_ros.identification.problem.scan import OutputScan
 from stiction_ros.identification.switching.step_signals import StepSignals
 
@@ -95,3 +101,14 @@ def test_a_window_that_begins_before_its_lags_is_refused() -> None:
     one = np.ones(1)
     with pytest.raises(ValueError, match="begins at 5"):
         OutputScan(np.zeros(100), np.empty((0, 100)), (), Orders(1, 1, 0, 5), (0, 9), one, one)
+
+
+def test_delays_are_chosen_for_the_stems_that_a_model_has() -> None:
+    record = loops.example1(1, samples=500)
+    options = IdentificationOptions(output_order=1, delay=(3, 7))
+    data, orders = prepare(record, options), window(options, 1, 1)
+    late = np.ascontiguousarray(np.roll(data.u, 2, axis=1))
+    wrong = Model(np.array([[5.0, 2.0]]), np.zeros(1), late, ((3,),), ())
+    models = (dataclasses.replace(wrong, delays=((delay,),)) for delay in range(3, 8))
+    least = min(refit(data, model, orders, warm=False).loss for model in models)
+    assert linear_model(data, orders, wrong).loss == pytest.approx(least)
