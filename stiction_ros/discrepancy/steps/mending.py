@@ -58,7 +58,7 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
     The larger of two is found first, whichever it is: what a model that is off leaves
     behind every move looks like steps.
     """
-    if task.options.process_fitted or state.changes:
+    if task.options.process_fitted or state.changes or not suspicious(state.base):
         return None
     margin = task.options.margin
     now = whole(state.bare, task.runs, state.added)
