@@ -12,15 +12,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import Candidate, Judge, rows_apart
 from stiction_ros.identification.evidence.fit_problem import LIMIT, Problem
 from stiction_ros.identification.evidence.output_fit import OutputFit
-from stiction_ros.identification.friction.grid import even_grid
+from stiction_ros.identification.friction.grid import TURN, even_grid, samples_of_turns
 
 TURNS = 6  # of OP in the first beginning
-TURN = 0.1  # of the span of OP: less is no turn
 LEAST = 100  # rows of it
 PART, MOST = 16, 3  # of the rows: no less than a sixteenth, no more than a third
 GROWTH = 1.5  # of a beginning to the next
@@ -89,11 +87,3 @@ def _first(problem: Problem, valve: int) -> int:
     samples = samples_of_turns(problem.op[valve], TURN, TURNS)
     rows = problem.rows if samples is None else (samples - 1) // problem.rate + 1
     return max(min(rows, problem.rows // MOST), LEAST, problem.rows // PART)
-
-
-def samples_of_turns(op: FloatArray, band: float, turns: int) -> int | None:
-    """Return how many samples of OP hold so many reversals by ``band``; None: there are fewer."""
-    moves = np.diff(HeStiction.simulate_grid(np.array([[band, band]]), op, float(op[0]))[:, 0])
-    at = np.flatnonzero(moves)
-    reversed_at = at[1:][np.sign(moves[at[1:]]) != np.sign(moves[at[:-1]])]
-    return int(reversed_at[turns - 1]) + 1 if len(reversed_at) >= turns else None

@@ -19,9 +19,8 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.evidence.growing import TURN, samples_of_turns
 from stiction_ros.identification.exact.pattern_search import PatternSearch, points_of
-from stiction_ros.identification.friction.grid import even_grid
+from stiction_ros.identification.friction.grid import TURN, even_grid, samples_of_turns
 from stiction_ros.identification.problem.models import Criterion, Data, Model, with_valve
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.switching.patterns import Beginning, cells_at

@@ -7,8 +7,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from stiction_ros.checks import one_of
-from stiction_ros.effects import Behaviour, FloatArray, FrictionLaw, Stiction, behaviours
+from stiction_ros.effects import (
+    Behaviour,
+    FloatArray,
+    FrictionLaw,
+    HeStiction,
+    Stiction,
+    behaviours,
+)
 from stiction_ros.errors import InputError
+
+TURN = 0.1  # of the span of OP: less is no turn
 
 
 def laws() -> dict[str, type[FrictionLaw]]:
@@ -135,3 +144,11 @@ def simulate(
     elif len(further):
         rows = np.column_stack([rows, np.tile(further, (len(rows), 1))])
     return law.simulate_grid(rows, u, start)
+
+
+def samples_of_turns(op: FloatArray, band: float, turns: int) -> int | None:
+    """Return how many samples of OP hold so many reversals by ``band``; None: there are fewer."""
+    moves = np.diff(HeStiction.simulate_grid(np.array([[band, band]]), op, float(op[0]))[:, 0])
+    at = np.flatnonzero(moves)
+    reversed_at = at[1:][np.sign(moves[at[1:]]) != np.sign(moves[at[:-1]])]
+    return int(reversed_at[turns - 1]) + 1 if len(reversed_at) >= turns else None
