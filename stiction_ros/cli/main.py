@@ -27,7 +27,7 @@ COMMANDS = {
     "report": "a page of a record or of a recorded run",
     "gain": "what service or retuning would bring",
     "valve-test": "a test in manual: its moves, its verdict",
-    "experiment": "simulate moves of OP that show friction",
+    "experiment": "simulate moves of OP, or a plant of loops",
     "simulate": "run a loop model under its own controller",
     "fit-linear": "fit a linear model for a controller",
     "replay": "decide over a bag as the nodes did live",

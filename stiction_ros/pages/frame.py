@@ -60,7 +60,7 @@ th[aria-sort=ascending] button::after { content: " ▲"; }
 th[aria-sort=descending] button::after { content: " ▼"; }
 td.t, th.t, tbody th { text-align: left; }
 tbody th { color: inherit; vertical-align: top; }
-table:not(.list) td.t { overflow-wrap: anywhere; min-width: 7ch; }
+table:not(.list) td.t { overflow-wrap: break-word; min-width: 7ch; }
 .name { overflow-wrap: break-word; } td.wordy { overflow-wrap: anywhere; min-width: 14ch; }
 ::placeholder { color: var(--soft); opacity: 1; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 3px 16px; font-size: .92rem; }

@@ -47,7 +47,7 @@ def table() -> str:
 
 def _cells(fault: Fault) -> list[str]:
     paces = "both" if fault.paces == BOTH_PACES else fault.paces[0].value
-    phases = "before and after" if fault.phases == BOTH_PHASES else fault.phases[0].value
+    phases = "both" if fault.phases == BOTH_PHASES else fault.phases[0].value
     notices = []
     for notice in fault.notices:
         only = "" if set(notice.paces) >= set(fault.paces) else f" ({notice.paces[0].value})"

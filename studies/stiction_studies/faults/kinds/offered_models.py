@@ -139,7 +139,7 @@ def _take_back(loop: RunningLoop) -> None:
     loop.probe.silence("loop_model")
 
 
-REFUSED = "is refused in one sentence; the text is not repeated in the log"
+REFUSED = "is refused in one sentence, without its text"
 
 FAULTS = (
     Fault(
