@@ -287,7 +287,7 @@ def test_stamps_that_are_there_twice(tmp_path: Path) -> None:
     (record,) = loop.parts
     assert len(record) == ROWS
     assert record.pv[30, 0] == 205.5
-    assert "that was there already: the last value counts, 1 differ" in said(loop)
+    assert "time stamp of an earlier row: the last value counts, 1 differ" in said(loop)
     assert "time does not increase at line 33" in str(one(path, strict=True).problem)
 
 

@@ -19,7 +19,7 @@ class Past:
         """Start empty."""
         self.limit, self.count = limit, 0
         self._op, self._pv, self._dv = (
-            np.empty((2 * limit, width)) for width in (valves, outputs, disturbances)
+            np.zeros((2 * limit, width)) for width in (valves, outputs, disturbances)
         )
         self._first = self._end = 0
 

@@ -226,7 +226,7 @@ def _frictions(values: Mapping[str, str], mark: str) -> dict[str, float]:
     found = {}
     for key, value in values.items():
         valve, dot, name = key.rpartition(mark)
-        if not (valve and dot and name):
+        if not (valve and dot and name) or name.startswith("trusted_"):
             continue
         with contextlib.suppress(ValueError):
             found[f"{valve}.{name}"] = float(value)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from stiction_ros.control import ControlMode
 from stiction_studies.faults.fault import Fault
 from stiction_studies.faults.kinds.lost_signals import NAN, relayed
 from stiction_studies.faults.kinds.stopped_nodes import NO_PV, kill_and_restart
@@ -14,7 +13,7 @@ from stiction_studies.faults.loop.running import RunningLoop
 from stiction_studies.faults.terms import Notice, Pace, Phase
 
 REALTIME, LOCKSTEP = (Pace.REALTIME,), (Pace.LOCKSTEP,)
-TEST = ControlMode.VALVE_TEST.value
+TEST = "valve_test"  # mode of the controller
 BEGINS, ENDS = 10.0, 10.0  # s until a test has begun, and has ended after the fault
 RESTS = 5  # samples of the test before the fault
 AWAY = 2.0  # of the set-point, and of OP in %: well beyond rounding
