@@ -43,7 +43,7 @@ def commands(text: str) -> Iterator[list[str]]:
 
 def test_the_readme_and_the_pages_keep_their_limits() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= LINES_OF_README
-    words = {page.name: len(page.read_text(encoding="utf-8").split()) for page in PAGES}
+    words = {page: len(page.read_text(encoding="utf-8").split()) for page in PAGES}
     assert not {name: count for name, count in words.items() if count > WORDS_OF_PAGE}
     assert sum(words.values()) <= WORDS
 
