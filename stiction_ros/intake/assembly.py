@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.clocks import put_right
 from stiction_ros.intake.intake_options import IntakeOptions
 from stiction_ros.intake.loop import Loop
@@ -66,6 +66,9 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     """
     _refuse_incomplete(found)
     rules = Rules(options.strict)
+    for note, block in {note: one for one in found.blocks for note in one.mended}.items():
+        with foreign(block.path):
+            rules.tell(note, note)
     timed = put_right(each(found.blocks, rules, with_times), rules)
     timed = each(timed, rules, partial(with_values, shared=found.shared))
     if len(timed) > 1:

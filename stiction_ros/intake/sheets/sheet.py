@@ -56,6 +56,11 @@ class Sheet(abc.ABC):
     header_once: bool = False
     row_word: str = "line"
 
+    @property
+    def mended(self) -> list[str]:
+        """What was put right in the rows that were read last, in sentences."""
+        return []
+
     @abc.abstractmethod
     def pieces(self, rows: int | None = None) -> Iterator[Piece]:
         """Yield the data, so many ``rows`` at a time; None takes :data:`PIECE` cells.
@@ -127,6 +132,7 @@ class RowSheet(Sheet):
         commas = any(map(_COMMA.fullmatch, quoted)) and not any(map(_POINT.fullmatch, quoted))
         self.decimal_comma = delimiter != "," or commas
         self._names = [_plain(cell) for cell in top[self.layout.place]]
+        self._again: list[tuple[int, list[str]]] = []
 
     def pieces(self, rows: int | None = None) -> Iterator[Piece]:
         width = len(self.layout.header)
@@ -137,28 +143,60 @@ class RowSheet(Sheet):
                 for line, cells in opened
                 if (cells and cells[0]) or any(cell.strip() for cell in cells)
             )
-            below = itertools.islice(filled, self.layout.first, None)
-            names = set(filter(None, self._names))
-            data = (r for r in below if names.isdisjoint(r[1]) or not self._is_header(*r))
+            data = self._by_name(itertools.islice(filled, self.layout.first, None))
             while piece := list(itertools.islice(data, size)):
                 lines, cells = zip(*piece, strict=True)
                 padded = [row[:width] + [""] * (width - len(row)) for row in cells]
                 yield list(zip(*padded, strict=True)), np.array(lines)
 
-    def _is_header(self, line: int, cells: Sequence[str]) -> bool:
-        """Tell whether the header stands again, as in files put together; refuse another one."""
+    def _by_name(self, rows: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
+        """Yield rows without headers that return; behind one in another order cells by name."""
+        self._again = []
+        names = {name for name in self._names if name}
+        order: list[int] | None = None
+        for line, cells in rows:
+            if not names.isdisjoint(cells) and (given := self._header(cells)) is not None:
+                self._again.append((line, given))
+                order = None if self._is_same(given) else self._order(given)
+            elif order is None:
+                yield line, cells
+            else:
+                yield line, [cells[k] if 0 <= k < len(cells) else "" for k in order]
+
+    def _header(self, cells: Sequence[str]) -> list[str] | None:
+        """Return the names in a row that is a header of mostly these columns; None for data."""
         given = [_plain(cell) for cell in cells]
         told = [name for name in given if name]
         known = sum(name in self._names for name in told)
-        data = self.header_once or any(is_number(name) or is_stamp(name) for name in told)
-        if data or known < max(2, 0.5 * len(told)):
-            return False
-        if given[: len(self._names)] != self._names:
-            raise InputError(
-                f"has other columns or another order from {self.row_word} {line} on",
-                fix="make a file of its own of what follows there",
+        data = any(is_number(name) or is_stamp(name) for name in told)
+        return None if self.header_once or data or known < max(2, 0.5 * len(told)) else given
+
+    def _is_same(self, given: Sequence[str]) -> bool:
+        return given[: len(self._names)] == self._names
+
+    def _order(self, given: Sequence[str]) -> list[int]:
+        """Return where each column stands in rows under another header; -1 for nowhere."""
+        at = {name: iter([k for k, other in enumerate(given) if other == name]) for name in given}
+        return [next(at[name], -1) if name in at and name else -1 for name in self._names]
+
+    @property
+    def mended(self) -> list[str]:
+        told = []
+        same = [line for line, given in self._again if self._is_same(given)]
+        if same:
+            more = f" and {len(same) - 1} times more" if len(same) > 1 else ""
+            told.append(f"the header stands again at {self.row_word} {same[0]}{more}, left out")
+        for line, given in self._again:
+            if line in same:
+                continue
+            lost = ",".join(name for name in self._names if name and name not in given)
+            new = ",".join(name for name in given if name and name not in self._names)
+            told.append(
+                f"the header of {self.row_word} {line} has other columns or another order: what "
+                f"follows is read by its names{f', without {lost}' if lost else ''}"
+                f"{f'; {new} is left out' if new else ''}"
             )
-        return True
+        return told
 
 
 def _plain(cell: str) -> str:

@@ -73,6 +73,7 @@ class Block:
         mask: quality of each row as the file says it, None when it does not.
         notes: how it was read.
         stray: the first time that is none, as an error says it; empty for none.
+        mended: what was wrong with the table and is put right, in sentences.
     """
 
     path: Path
@@ -84,6 +85,7 @@ class Block:
     mask: QualityArray | None = None
     notes: tuple[str, ...] = ()
     stray: str = ""
+    mended: tuple[str, ...] = ()
 
     def of(self, *signals: str) -> dict[Key, Column]:
         """Return the columns of some signals, in their order."""

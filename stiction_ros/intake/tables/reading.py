@@ -186,6 +186,7 @@ def _block(
         lines=lines,
         columns=columns,
         stray="" if times.wrong is None else times.wrong.said,
+        mended=tuple(sheet.mended),
     )
 
 
