@@ -253,7 +253,7 @@ class CubicCandidate(ValveCandidate):
 
     @property
     def absorbed(self) -> bool:
-        """Left out beside a fitted process, which has a slope of its own."""
+        """A fitted process takes the slope of the curve up."""
         return True
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:

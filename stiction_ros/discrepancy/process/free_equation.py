@@ -52,10 +52,6 @@ class Equation:
         """Return the equation with other delays."""
         return dataclasses.replace(self, delay=tuple(delay))
 
-    def raised(self, poles: int) -> Equation:
-        """Return the equation with that many more coefficients a, all 0."""
-        return dataclasses.replace(self, a=np.concatenate([self.a, np.zeros(poles)]))
-
 
 @dataclasses.dataclass(frozen=True)
 class Fitted:

@@ -210,9 +210,11 @@ def rests_left(run: FreeRun) -> Callable[[CandidateFit], int]:
 def _extended(
     task: Task, state: State, decision: Decision
 ) -> tuple[State, LoopModel, Extension | None]:
-    """Return the state behind which the chosen effect stands, its model, and that with it.
+    """Add the chosen effect to the model.
 
-    None where none may be added.
+    Returns:
+        The state that the effect is added to; the model without effects behind which it was
+        fitted; the extension, None where no effect may be added.
     """
     chosen = decision.chosen
     lent = chosen is None and state.doubted is None and not task.options.process_fitted

@@ -112,15 +112,11 @@ class LiveController:
         return self._controller.frictions
 
     def known_friction(self) -> list[tuple[str, float]]:
-        """Return the friction in force as pairs such as ``("V1.f_s", 8.0)``, in %.
-
-        They are f_S, f_D and what else the law has for parameters.
-        """
+        """Return the parameters of the laws in force as pairs such as ``("V1.f_s", 8.0)``, %."""
+        forms = self._controller.valves.forms
         return [
             (f"{name}.{key}", value)
-            for name, form in zip(
-                self.model.valve_names, self._controller.valves.forms, strict=True
-            )
+            for name, form in zip(self.model.valve_names, forms, strict=True)
             if form is not None
             for key, value in form.law.figures().items()
         ]
