@@ -137,12 +137,7 @@ def _verdict(record: Record, identified: Identification, gain: Any) -> dict[str,
 
 
 def show(found: Any, verdict: Mapping[str, Any]) -> None:
-    """Print the verdict, what each option brings with its interval, and the notes.
-
-    Args:
-        found: what would help.
-        verdict: on the valve; empty for a model.
-    """
+    """Print the ``verdict`` on the valve, what each option brings, its interval, and notes."""
     console = Console()
     console.print(_headline(found, verdict), highlight=False)
     table = Table()

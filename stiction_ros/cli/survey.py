@@ -200,10 +200,7 @@ def _write(found: Any, out: Path, earlier: Sequence[Any]) -> None:
 
 
 def _pairs(file: str | None) -> list[tuple[int, str, str]]:
-    """Return row and first two cells of each row of a table, semicolons or commas between them.
-
-    A first line whose first cell is ``loop``, ``tag`` or ``name`` is a head.
-    """
+    """Return row and first two cells of each row of a table, semicolons or commas between them."""
     if file is None:
         return []
     with foreign(file), open_text(Path(file)) as source:
@@ -218,11 +215,7 @@ def _pairs(file: str | None) -> list[tuple[int, str, str]]:
 
 
 def _costs(file: str | None) -> dict[str, float]:
-    """Return the cost of each loop; numbers are written as in exports, with point or comma.
-
-    Raises:
-        InputError: the file cannot be read, or a cost is no number of 0 or more.
-    """
+    """Return the cost of each loop; numbers are written as in exports, with point or comma."""
     found = {}
     for row, name, text in _pairs(file):
         cells = Numbers(decimal_comma=True)

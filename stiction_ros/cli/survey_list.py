@@ -27,12 +27,7 @@ APART = 2
 
 
 def print_list(found: Survey, earlier: Sequence[Earlier]) -> None:
-    """Print the first rows, in the words of the page.
-
-    Args:
-        found: what to print.
-        earlier: surveys before it, the oldest first.
-    """
+    """Print the first rows, in the words of the page; ``earlier`` surveys begin with the oldest."""
     from stiction_ros.survey.listing.headline import changed, headline, worked
     from stiction_ros.survey.pages.words import period
 

@@ -255,13 +255,7 @@ class EmbeddingMpc(Formulation):
     def certificate(
         self, state: FloatArray, target: Target, last: FloatArray, plan: Plan, samples: int
     ) -> Certificate:
-        """Return how far ``plan`` is from the best that any pattern of jumps can do.
-
-        Args:
-            state, target, last: as given to :meth:`plan`.
-            plan: what that returned.
-            samples: of the horizon in which jumps are free, 1 … N.
-        """
+        """Return how far the ``plan`` is from the best of any jumps in the first samples."""
         sticky = [form is not None for form in self.forms]
         price = self.tuning.jump_price
         jumps = FreeJumps(self.cost, self.limits, self.valves(last), sticky, price, samples)

@@ -270,10 +270,7 @@ class HorizonQp:
 
 
 def slack_weights(cost: HorizonCost) -> FloatArray:
-    """Return the weight of the squared slack of each output, halved in the cost, shape (p,).
-
-    It is the same for every pattern of moves, or their costs would not compare.
-    """
+    """Return the weight, halved in the cost, of each output's squared slack, shape (p,)."""
     reach = (cost.forced_output**2).sum(axis=(0, 2))
     scale = float(np.trace(cost.hessian)) / np.maximum(reach, 1e-300)
     return np.asarray(SLACK_WEIGHT * cost.horizon * scale)

@@ -59,11 +59,7 @@ class Observer:
     """
 
     def __init__(self, model: LinearModel, tuning: ObserverTuning) -> None:
-        """Design the gain.
-
-        Raises:
-            InputError: the augmented model is not detectable, so no offset-free control.
-        """
+        """Design the gain; InputError when the augmented model is not detectable."""
         _check_detectable(model)
         self.model = model
         n, p = model.order, len(model.pv0)
@@ -99,8 +95,7 @@ class Observer:
     def misfit(self) -> float:
         """The last innovation squared and weighed by its expected covariance.
 
-        Beyond the width of the gate it counts as on it, whether it is held back or not: what is
-        held back is no good fit, and an outlier is as bad for every observer that meets it.
+        Beyond the width of the gate it counts as on it, whether it is held back or not.
         """
         seen = np.clip(self._seen, -self._outlier, self._outlier)
         return float(seen @ self._weight @ seen)

@@ -71,13 +71,7 @@ class PatternBounds:
         self._bounds(np.zeros(self._count), np.zeros(shape), np.ones(shape))
 
     def of(self, gradient: FloatArray, deviation: FloatArray, valves: StickyState) -> FloatArray:
-        """Return a lower bound for every combination, shape (P,).
-
-        Args:
-            gradient: of the cost at the target, shape (N m,).
-            deviation: χ̂ − χ_ss, shape (m,).
-            valves: what is known of them.
-        """
+        """Return a lower bound for every combination, (P,), by gradient and χ̂ − χ_ss, (m,)."""
         linear = self._map @ gradient
         c, whole = self._count, self._whole
         base = deviation @ (0.5 * whole[c:, c:] @ deviation + linear[c:])

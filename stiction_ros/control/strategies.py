@@ -81,13 +81,7 @@ class Strategies:
     def __init__(
         self, formulation: Formulation | None, stand_in: Formulation | None, rule: FallbackRule
     ) -> None:
-        """Begin without a past.
-
-        Args:
-            formulation: in force; None for the mode ``hold``.
-            stand_in: the unaware controller, where ``formulation`` is another.
-            rule: how long the strategies may stand in.
-        """
+        """Begin without a past; ``stand_in`` is the unaware controller, if not in force."""
         self._formulation, self._stand_in, self._rule = formulation, stand_in, rule
         self._plan: Plan | None = None
         self._age = self._held = 0

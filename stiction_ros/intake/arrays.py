@@ -48,11 +48,7 @@ _AS_ARGUMENTS = (
 
 
 class ColumnSheet(Sheet):
-    """Columns in memory.
-
-    Args:
-        name: for errors.
-        columns: name to values, shape (N,) each: numbers, times or texts.
+    """Columns in memory by name, shape (N,) each: numbers, times or texts.
 
     Raises:
         InputError: columns that are not of one length.
@@ -83,14 +79,9 @@ def record_from_arrays(
     name: str,
     op_unit: str | None,
 ) -> Record:
-    """Return :meth:`stiction_ros.records.record.Record.from_arrays`.
+    """Return :meth:`stiction_ros.records.record.Record.from_arrays`, with its arguments.
 
-    Args:
-        time: as there.
-        signals: arrays of op, pv, sp and stem, as there.
-        tags: given tags of the valves, ``V``, and the outputs, ``PV``.
-        name: of the record.
-        op_unit: as there.
+    The ``tags`` are those of the valves, ``V``, and the outputs, ``PV``, where they are given.
     """
     step = np.ndim(time) == 0
     if step and not (np.asarray(time).dtype.kind in "iuf" and 0 < time < np.inf):
@@ -130,15 +121,7 @@ def record_from_arrays(
 def record_from_frame(
     frame: Any, columns: Mapping[str, Any], time: Any, name: str, options: Mapping[str, Any]
 ) -> Record:
-    """Return :meth:`stiction_ros.records.record.Record.from_dataframe`.
-
-    Args:
-        frame: as there.
-        columns: of op, pv, sp and stem, as there.
-        time: as there.
-        name: of the record.
-        options: how to read it, by the names of its arguments.
-    """
+    """Return :meth:`stiction_ros.records.record.Record.from_dataframe`, with its arguments."""
     keys = getattr(frame, "columns", frame)
     if keys is frame and not isinstance(frame, Mapping):
         raise InputError(

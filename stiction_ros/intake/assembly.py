@@ -59,11 +59,7 @@ class Found:
 
 
 def loop_of(found: Found, options: IntakeOptions) -> Loop:
-    """Return a loop with its records.
-
-    Raises:
-        InputError: it cannot be made into records, and why.
-    """
+    """Return a loop with its records; InputError when it cannot be made into records, and why."""
     _refuse_incomplete(found)
     rules = Rules(options.strict)
     for note, block in {note: one for one in found.blocks for note in one.mended}.items():

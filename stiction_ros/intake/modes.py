@@ -33,7 +33,6 @@ def manual_marked(block: Block, rules: Rules, automatic: tuple[str, ...] | None)
     """Return the block with samples in manual or tracking marked so, and without its mode.
 
     An empty mode goes on as before. Numbers are told apart by OP, which stands still in manual.
-
     What is shown in ``automatic`` may be said; None knows the usual words.
 
     Raises:

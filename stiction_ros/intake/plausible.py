@@ -65,10 +65,8 @@ def in_percent(
 ) -> tuple[Block, str, str]:
     """Return the block with OP and stem in %, the unit, and a note on what was done.
 
-    Args:
-        block: as read.
-        given: unit that a user or a tag list says; None takes the export's word.
-        named: whether a user said which column is what.
+    A user or a tag list may have ``given`` the unit; whether a user ``named`` the columns matters
+    to the advice.
 
     Raises:
         InputError: OP lies between 0 and 1 and nothing says what it is, or far outside of the unit
@@ -127,10 +125,7 @@ def _without_unit(block: Block, ops: Sequence[Column], *, named: bool) -> tuple[
 
 
 def _fits(block: Block, unit: OpUnit, *, given: bool, named: bool) -> str:
-    """Return a note where OP often lies below its unit, as one without its mean does.
-
-    Where the median, or many samples, lie outside of the unit it is refused.
-    """
+    """Return a note where OP often lies below its unit, as one without its mean does."""
     factor, offset = TO_PERCENT[unit]
     note = ""
     said = f"though {'OP is said to be in' if given else 'the export says'} {SAID[unit]}"
@@ -178,16 +173,13 @@ def refuse_twice(block: Block) -> None:
 
 
 def refuse_swapped(block: Block) -> None:
-    """Raise when PV and OP look swapped.
+    """Raise an :class:`InputError` when PV and OP look swapped.
 
     Where a set-point is recorded, the measurement is what stays near it. Else:
     In closed loop a controller's output moves by K (Δe + T_s/T_i e): its Δ is explained by the
     measurement and its Δ at the same sample, and not the other way round. What rounding and
     compression hide of that shows over some samples, see :data:`STRIDES`. Of exact controllers
     :mod:`stiction_ros.identification.problem.input_checks` knows more.
-
-    Raises:
-        InputError: OP and PV look swapped.
     """
     op, pv, sp = (_only(block, signal) for signal in ("op", "pv", "sp"))
     if op is None or pv is None:
@@ -203,11 +195,7 @@ def refuse_swapped(block: Block) -> None:
 
 
 def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
-    """Return whether ``one`` is :data:`CLOSER` to the set-point, and it alone without an offset.
-
-    Where neither has a lasting offset, as in signals without their means, the unit alone may make
-    the one smaller.
-    """
+    """Return whether ``one`` is :data:`CLOSER` to the set-point, and it alone without an offset."""
     there = np.isfinite(sp) & np.isfinite(one) & np.isfinite(other)
     if np.count_nonzero(there) < FEWEST:
         return False
@@ -220,10 +208,7 @@ def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
 
 
 def _swapped(block: Block, reason: str, otherwise: Sequence[str] = ()) -> InputError:
-    """Return the error of a block whose one OP and one PV look swapped.
-
-    What is to be said ``otherwise``, if they are not, is advised with their names.
-    """
+    """Return the error of a block whose one OP and one PV look swapped."""
     tag, name = {}, {}
     for key, column in block.columns.items():
         tag[key.signal], name[key.signal] = key.tag, column.name

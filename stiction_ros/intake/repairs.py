@@ -1,9 +1,6 @@
 """What is wrong with the rows of a loop: told, counted, and masked, held or cut by one rule.
 
-Rows without a time are left out, single rows out of order sorted; of rows with one stamp the last
-counts. What is no number, of bad quality, or far outside everything else (a sentinel such as −9999)
-is missing: up to :data:`HELD` samples in a row are held (OP, SP) or interpolated (PV), more are
-bad. Missing set-points are held however long.
+What is missing is held (OP, SP) or interpolated (PV) for up to :data:`HELD` samples, else bad.
 """
 
 from __future__ import annotations
@@ -81,11 +78,7 @@ def each(
 
 
 def with_times(block: Block, rules: Rules) -> Block:
-    """Return the rows that have a time.
-
-    Raises:
-        InputError: none has one, or more than :data:`FEW` have one that is not understood.
-    """
+    """Return the rows that have a time; InputError if none, or more than ``FEW`` are strange."""
     there, strange = np.isfinite(block.time), int(np.count_nonzero(np.isinf(block.time)))
     lost = len(there) - int(np.count_nonzero(there))
     if not lost:

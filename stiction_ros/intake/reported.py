@@ -1,9 +1,6 @@
 """Signals that were reported when they changed, brought onto a regular grid.
 
-OP, SP and modes hold until the next report; PV goes straight from report to report, as in
-records with missing rows. What is not known between two reports is lost, which is said. Tags
-asked regularly, each on its own clock, are reports only in their stamps: PV keeps its values, and
-OP holds, as a line through the stairs of OP gives another friction.
+OP, SP and modes hold until the next report; PV goes straight from report to report.
 """
 
 from __future__ import annotations
@@ -48,8 +45,7 @@ def at_pv(block: Block, rules: Rules) -> Block | None:
     """Return the rows of PV with what every other signal was last, or None.
 
     So nothing measured is moved where each tag is asked as often as the other on a clock of its
-    own: PV has no value but its own, and OP is what the valve had been given. It is None where
-    there are several PV, or PV has fewer stamps than another signal.
+    own. It is None where there are several PV, or PV has fewer stamps than another signal.
     """
     stamps, outputs = _reports(block), list(block.of("pv"))
     if len(outputs) != 1 or len(stamps[outputs[0]]) < COVERED * max(map(len, stamps.values())):
@@ -87,9 +83,6 @@ def on_grid(block: Block, sample_time: float | None, rules: Rules) -> list[Block
         block: signals at increasing stamps, blank where nothing was reported.
         sample_time: s; None takes the scan that the stamps show.
         rules: get the note.
-
-    Raises:
-        InputError: a signal has fewer than two reports, or strict.
     """
     stamps = _reports(block)
     needed = {key: stamps[key] for key in block.of("op", "pv")}

@@ -138,9 +138,6 @@ class PiControllers:
 def own_controller(model: LoopModel) -> PiController:
     """Return the controller that ``model`` records, at rest at the loop's starting point.
 
-    Args:
-        model: a loop of one valve and one output with ``controller: {kind: pi, …}``.
-
     Raises:
         InputError: the loop records no controller, or has more valves or outputs than a PI
             controller serves.

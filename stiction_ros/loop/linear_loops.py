@@ -1,7 +1,6 @@
 """Loops of controllers, sticky valves and a linear process, many at once, compiled.
 
-Per sample and run: every PV by equation (9), every OP by the velocity form of its controller, every
-stem by the law of its valve. A valve without a controller keeps its OP.
+A valve without a controller keeps its OP.
 """
 
 from __future__ import annotations
@@ -127,10 +126,7 @@ def command(
 
 @compiled
 def _in_lanes(values: FloatArray, first: int, by_lane: FloatArray) -> None:
-    """Copy runs from ``first`` on, shape (R, n, q), side by side, shape (n, q, LANES).
-
-    Where there are fewer, the last one is repeated.
-    """
+    """Copy runs from ``first`` on, shape (R, n, q), side by side, shape (n, q, LANES)."""
     for lane in range(LANES):
         run = min(first + lane, len(values) - 1)
         for k in range(values.shape[1]):

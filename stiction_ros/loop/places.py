@@ -14,17 +14,10 @@ KINDS = ("valve", "load", "process", "sensor", "disturbance")
 def append_effect(
     document: dict[str, Any], place: str, effect: Behaviour, process: Process
 ) -> None:
-    """Add ``effect`` at ``place`` to the YAML mapping ``document``, in place.
+    """Add ``effect`` at ``place`` to the YAML mapping ``document`` of a loop model.
 
-    Args:
-        document: of a loop model.
-        place: ``valve:TAG``, ``load:TAG``, ``process:TAG``, ``sensor:TAG`` or
-            ``disturbance:TAG``.
-        effect: what acts there.
-        process: of the same loop, for its tags.
-
-    Raises:
-        InputError: no such place.
+    The place is ``valve:TAG``, ``load:TAG``, ``process:TAG``, ``sensor:TAG`` or ``disturbance:TAG``
+    of the ``process``; InputError for any other.
     """
     kind, _, tag = place.partition(":")
     if kind not in KINDS:

@@ -35,14 +35,8 @@ def read_valve_changes(
 ) -> tuple[ValveChange, ...]:
     """Return the changes in the order of their times.
 
-    Args:
-        value: a list of ``{time, valve, effects}``, or the same as YAML text, as a ROS parameter
-            holds it; empty for none.
-        valves: tags of the loop.
-        where: for messages.
-
-    Raises:
-        InputError: naming the entry at fault.
+    The ``value`` is a list of ``{time, valve, effects}``, or that as YAML text, as a ROS parameter
+    holds it; empty for none. The error names the entry at fault.
     """
     if isinstance(value, str):
         value = parse_yaml(value, where) if value.strip() else []

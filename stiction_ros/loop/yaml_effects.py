@@ -9,15 +9,7 @@ from stiction_ros.loop.yaml_reading import Section
 
 
 def read_effects(section: Section, place: str) -> tuple[Behaviour, ...]:
-    """Return the behaviours of the key ``effects``, none where it is absent.
-
-    Args:
-        section: of a valve, an output or a sensor.
-        place: where they act, such as ``valve``.
-
-    Raises:
-        InputError: naming the entry at fault.
-    """
+    """Return the behaviours of the key ``effects``, none if it is absent; errors name the entry."""
     effects = []
     for entry in section.sections("effects", []):
         try:
@@ -28,11 +20,7 @@ def read_effects(section: Section, place: str) -> tuple[Behaviour, ...]:
 
 
 def at_place(effect: Behaviour, place: str) -> Behaviour:
-    """Return an effect that may act at a kind of place; one that names no places acts anywhere.
-
-    Raises:
-        InputError: it acts elsewhere.
-    """
+    """Return an effect that may act at a kind of place; one that names no places acts anywhere."""
     if effect.places and place not in effect.places:
         raise InputError(
             f"{effect.title()} cannot act on a {place}",

@@ -61,9 +61,7 @@ class TextLimits:
 def parse_limited(text: str, where: str, limits: TextLimits = TextLimits()) -> Any:
     """Return what a YAML text from outside holds; nothing in the error repeats the text.
 
-    Raises:
-        InputError: the text is longer, deeper or fuller than the limits, has aliases, or is no
-            YAML.
+    It may be longer, deeper or fuller than the limits, have aliases, or be no YAML.
     """
     if len(text) > limits.characters:
         raise InputError(f"more than {limits.characters} characters", where=where)

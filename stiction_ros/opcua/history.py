@@ -282,10 +282,9 @@ def record_of(tags: LoopTags, files: dict[str, HistoryFile], span: Span) -> Reco
 
 
 def modes_of(tags: LoopTags, files: dict[str, HistoryFile], record: Record) -> list[str] | None:
-    """Return the mode of the loop at each sample, empty where it is not known.
+    """Return the mode of the loop at each sample, empty where it is not known; None without one.
 
-    That of a loop with several valves is the first that is not automatic. None when the map
-    names none.
+    That of a loop with several valves is the first that is not automatic.
     """
     grid = np.rint((record.start + record.time) * 1e9).astype(np.int64) + tags.sample_ns // JITTER
     found: list[list[str]] = []

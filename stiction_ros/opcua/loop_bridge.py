@@ -127,13 +127,7 @@ class LoopBridge:
     def refuse(
         self, read: Mapping[str, str], written: Mapping[str, str], now: float
     ) -> list[WriteOrder]:
-        """Take in which tags the server refuses now, and return what is to be written.
-
-        Args:
-            read: tags that are not listened to, of any loop, and why each.
-            written: the same of tags that are not written.
-            now: s on our clock.
-        """
+        """Take in which tags of any loop the server refuses, and why; return what to write."""
         found = [f"tag {tag} {read[tag]}" for tag in self.tags.read_tags() if tag in read]
         if self.rules.writes:
             mine = [tag for tag in self.tags.written_tags() if tag in written]
@@ -334,14 +328,7 @@ class LoopBridge:
     def written(
         self, order: WriteOrder, failure: str, seconds: float, now: float
     ) -> list[WriteOrder]:
-        """Take in what became of an order, and return what is to be written.
-
-        Args:
-            order: as it was returned.
-            failure: why it was not written; empty when it was.
-            seconds: that the server took.
-            now: s on our clock.
-        """
+        """Take in an order with its ``failure``, if any, and seconds; return what to write."""
         told = self.tags.grant
         assert told is not None
         self.counts[f"{order.kind.value}_{'failed' if failure else 'written'}"] += 1

@@ -80,12 +80,7 @@ class Written:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Refused:
-    """Tags that the server refuses now, each with why; the others are listened to, or written.
-
-    Attributes:
-        read: tags that are not listened to.
-        written: tags that are not written.
-    """
+    """Tags that the server refuses now, each with why: those not listened to, those not written."""
 
     read: Mapping[str, str]
     written: Mapping[str, str]

@@ -201,11 +201,7 @@ class LoopSampler:
         self.counts["new_runs"] += 1
 
     def _begin_without_change(self, now: float) -> None:
-        """Begin at the newest stamp when no PV has changed for three samples.
-
-        A server may report the tags of a new subscription in several parts, so a PV that was
-        not reported yet is given longer.
-        """
+        """Begin at the newest stamp when no PV has changed for three samples."""
         if self._next is not None or self._heard_at is None:
             return
         patience = FAR if all(self._changes[tag] for tag in self._pv) else UNREPORTED

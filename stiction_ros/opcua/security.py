@@ -46,11 +46,7 @@ class Credentials:
         return cls(*(getattr(given, field.name) for field in dataclasses.fields(cls)))
 
     def check(self, writes: bool) -> None:
-        """Refuse what cannot be connected with, and writing without encryption or user.
-
-        Raises:
-            InputError: a file that lacks, that others may read, or that has expired.
-        """
+        """Refuse what cannot be connected with, and writing without encryption or user."""
         if self.security == "none":
             if writes:
                 raise InputError(
@@ -81,11 +77,7 @@ class Credentials:
             self.password()
 
     def password(self) -> str:
-        """Return the password from its file.
-
-        Raises:
-            InputError: none is named, it lacks, or others may read it.
-        """
+        """Return the password from its file, which nobody else may read."""
         if not self.password_file:
             raise InputError("password_file is needed", where=f"user {self.user}")
         path = Path(self.password_file)
@@ -169,9 +161,7 @@ class Identity:
 
 
 def make_certificate(identity: Identity, certificate: Path, private_key: Path) -> None:
-    """Make a key and a self-signed application certificate (OPC UA part 6, 6.2.2).
-
-    The key is written for its owner alone.
+    """Make a key, for its owner alone, and a self-signed certificate (OPC UA part 6, 6.2.2).
 
     Raises:
         InputError: one of the files is there already, or cannot be written.

@@ -42,7 +42,8 @@ async def open_client(url: str, credentials: Credentials) -> Client:
 
     Raises:
         InputError: files that cannot be used, or certificates that have expired.
-        OSError, TimeoutError, asyncua.ua.UaError: the server cannot be reached, or refuses.
+        OSError, TimeoutError, asyncua.ua.UaError: the server cannot be reached, or refuses; so for
+            whatever asks the server.
     """
     from asyncua import Client, ua
     from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
@@ -82,11 +83,7 @@ def is_open(client: Client) -> bool:
 
 
 async def shown_certificate(url: str) -> x509.Certificate | None:
-    """Return what a server shows for signed and encrypted sessions; None where it has none.
-
-    Raises:
-        OSError, TimeoutError, asyncua.ua.UaError: the server cannot be asked.
-    """
+    """Return what a server shows for signed and encrypted sessions; None where it has none."""
     from asyncua import Client, ua
     from asyncua.crypto.uacrypto import x509_from_der
 
@@ -115,10 +112,7 @@ async def _compare(url: str, pinned: Path) -> None:
 
 
 async def _connect(client: Client) -> None:
-    """Connect; a connection that the other side has closed is not waited for.
-
-    The library waits for the answer to a question that it puts to a closed connection.
-    """
+    """Connect; a connection that the other side has closed is not waited for."""
     opening, closed = asyncio.create_task(client.connect()), 0
     try:
         while not opening.done() and closed < CLOSED:
@@ -135,11 +129,7 @@ async def _connect(client: Client) -> None:
 
 
 async def node_ids(client: Client, tags: Sequence[str]) -> dict[str, ua.NodeId]:
-    """Return the node id of each tag; ``nsu=URI;`` is looked up in the server's namespaces.
-
-    Raises:
-        InputError: a namespace that the server does not have, or no node id.
-    """
+    """Return the node id of each tag by :func:`node_id`."""
     spaces = await client.get_namespace_array()
     return {tag: node_id(tag, spaces) for tag in dict.fromkeys(tags)}
 
@@ -196,11 +186,7 @@ def describe(error: BaseException) -> str:
 
 
 async def kind_of(client: Client, node: ua.NodeId) -> ua.VariantType:
-    """Return the type of value that a node takes.
-
-    Raises:
-        OSError, TimeoutError, asyncua.ua.UaError: there is no such node, or the session is lost.
-    """
+    """Return the type of value that a node takes."""
     return await client.get_node(node).read_data_type_as_variant_type()
 
 

@@ -149,11 +149,7 @@ class TagMap:
 
     @classmethod
     def load(cls, path: Path | str) -> TagMap:
-        """Read a ``*.tags.yaml``.
-
-        Raises:
-            InputError: anything missing, unknown or written by two, in one line.
-        """
+        """Read a ``*.tags.yaml``; anything missing, unknown or written by two is an InputError."""
         top = Section(load_yaml(path), str(path))
         server = top.text("server") if "server" in top else ""
         loops = tuple(_loop(section) for section in top.sections("loops"))

@@ -98,13 +98,7 @@ def plot(
 
 
 def close_look(record: Record, found: Identification, units: Units) -> str:
-    """Return four cycles of one valve over time, and PV and the stem against OP.
-
-    Args:
-        record: that was looked at.
-        found: identification of this record.
-        units: of its signals.
-    """
+    """Return four cycles of one valve over time, and PV and the stem against OP."""
     window = Window.of(record, found)
     rows, i, j = window.rows, window.output, window.valve
     shown = window.named(record.sample_time)
@@ -132,13 +126,7 @@ def close_look(record: Record, found: Identification, units: Units) -> str:
 
 
 def all_signals(record: Record, stem: FloatArray | None, units: Units) -> str:
-    """Return each signal of a record over its time.
-
-    Args:
-        record: its samples that are not finite leave a gap.
-        stem: estimated stems, shape (N, m), % of travel; None where there is none.
-        units: of its signals.
-    """
+    """Return each signal of a record over its time; a ``stem`` is an estimate, shape (N, m), %."""
     drawn = over_record(record, stem, units)
     return f"<h2>Signals</h2>{''.join(drawn)}"
 
@@ -146,14 +134,7 @@ def all_signals(record: Record, stem: FloatArray | None, units: Units) -> str:
 def over_record(
     record: Record, stem: FloatArray | None, units: Units, view: View = View()
 ) -> list[str]:
-    """Return a figure of each PV and then of each OP.
-
-    Args:
-        record: its samples that are not finite leave a gap.
-        stem: estimated stems, shape (N, m), % of travel; None where there is none.
-        units: of its signals.
-        view: what of it is drawn.
-    """
+    """Return a figure of each PV and then of each OP, as :func:`all_signals`, of the ``view``."""
     rows, time = view.rows, record.time[view.rows]
     known = stem is not None or record.stem is not None
     drawn = [

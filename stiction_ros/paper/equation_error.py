@@ -1,7 +1,4 @@
-"""The one-step criterion of the paper for given stems: (12a), all outputs.
-
-It is the mean of SE (14) over the outputs, in squared engineering units of PV.
-"""
+"""The one-step criterion (12a) of given stems: the mean of SE (14) over outputs, units of PV²."""
 
 from __future__ import annotations
 
@@ -15,12 +12,7 @@ from stiction_ros.signals.arx_fit import ArxFit, ArxOrders, Delays, fit_arx
 
 @dataclasses.dataclass(frozen=True)
 class EquationError:
-    """The criterion of one record with its stems.
-
-    Attributes:
-        fits: one ARX model per output.
-        stems: simulated stem positions, shape (m, N), %.
-    """
+    """The criterion of one record with its stems, shape (m, N), %, and an ARX model per output."""
 
     fits: tuple[ArxFit, ...]
     stems: FloatArray

@@ -1,12 +1,8 @@
 """The grid search that the paper compares with, reference [20], as published.
 
-A triangular grid over (f_S, f_D) of all valves at once. For one point after another the stem is
-simulated, by the smoothed law (5) at τ = 10⁴; for one delay after another the ARX coefficients
-are found by least squares, and SE (14) is kept. The lowest mean SE wins. Nothing is shared
-between points: this is the baseline, and its cost is the number of points times the number of
-choices of delays.
-
-A record of p outputs has p independent least-squares problems per choice of delays.
+For each point of a triangular grid over (f_S, f_D) of all valves the stem is simulated, by the
+smoothed law (5) at τ = 10⁴; for each choice of delays ARX is fitted by least squares. The lowest
+mean SE (14) wins. Nothing is shared between points: this is the baseline.
 """
 
 from __future__ import annotations
@@ -78,12 +74,7 @@ def identify_by_grid(
     options: PaperOptions | None = None,
     progress: Progress | None = None,
 ) -> PaperIdentification:
-    """Identify by the grid search.
-
-    Args:
-        record: what was measured.
-        options: orders, delay range, ``grid_step``, ``grid_law``; None for the defaults.
-        progress: called with the share done, 0 to 1.
+    """Identify by the grid search; the options have its ``grid_step`` and ``grid_law``.
 
     Raises:
         InputError: a record that no model can be fitted to, a step coarser than the OP span,

@@ -1,9 +1,4 @@
-"""PaperIdentification by the paper's methods.
-
-- ``nlp``: the nonlinear programme (12) at its best, :mod:`.programme.nlp`.
-- ``nlp_printed``: the same to the letter, :mod:`.programme.printed`.
-- ``grid``: the grid search that the paper compares with, :mod:`.grid_search`.
-"""
+"""PaperIdentification by the paper's methods: ``nlp``, ``nlp_printed`` and ``grid``."""
 
 from __future__ import annotations
 
@@ -53,11 +48,6 @@ def identify(
     record: Record, options: PaperOptions | None = None, progress: Progress | None = None
 ) -> PaperIdentification:
     """Identify friction and linear dynamics as the paper does; see :class:`PaperOptions`.
-
-    Args:
-        record: what was measured.
-        options: ``options.method`` names the method; None for the nonlinear programme.
-        progress: called with the share done, 0 to 1.
 
     Returns:
         Point estimates without verdict or interval; ``search`` tells what was tried.

@@ -62,12 +62,7 @@ class Answer:
 
 
 def check_record(record: Record, options: PaperOptions) -> ArxOrders:
-    """Return the orders and ε of a record that can be worked on.
-
-    Raises:
-        InputError: a law that these methods do not have, no valve or output, a constant
-            signal, or too few samples.
-    """
+    """Return the orders and ε of a record that can be worked on; else InputError."""
     smooth_law(options.law)
     require_signals(record)
     orders = orders_of(record, options)
@@ -78,11 +73,7 @@ def check_record(record: Record, options: PaperOptions) -> ArxOrders:
 
 
 def orders_of(record: Record, options: PaperOptions) -> ArxOrders:
-    """Return the orders of a record, per channel where the options give them so, and ε.
-
-    Raises:
-        InputError: a number of orders that is not that of the outputs or of the valves.
-    """
+    """Return the orders of a record, per channel where the options give them so, and ε."""
     m, p = len(record.valves), len(record.outputs)
     longest = [options.delay[1]] * m
     output = DEFAULT_ORDER if options.output_order is None else options.output_order
@@ -113,9 +104,6 @@ def friction_limits(record: Record, options: PaperOptions) -> FloatArray:
 
     It is Δu of the sustained oscillation unless the options give another, and never more than
     OP spans.
-
-    Raises:
-        InputError: a number of limits that is not that of the valves.
     """
     if options.friction_limit is None:
         found = [one.span for one in sustained_oscillations(record)]
@@ -124,11 +112,7 @@ def friction_limits(record: Record, options: PaperOptions) -> FloatArray:
 
 
 def delay_choices(record: Record, options: PaperOptions, most: int) -> list[Delays]:
-    """Return all T^(m p) choices of delays, one delay per output and valve.
-
-    Raises:
-        InputError: more than ``most`` choices.
-    """
+    """Return all T^(m p) choices of delays, one delay per output and valve, ``most`` at most."""
     low, high = options.delay
     channels = len(record.valves) * len(record.outputs)
     count = (high - low + 1) ** channels

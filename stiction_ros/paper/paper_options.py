@@ -69,13 +69,7 @@ class PaperOptions:
 
     @classmethod
     def of(cls, options: IdentificationOptions, method: str, **chosen: object) -> PaperOptions:
-        """Return options of a method of the paper with the orders and delays of ``options``.
-
-        Args:
-            options: of an identification by the default search.
-            method: ``nlp``, ``nlp_printed`` or ``grid``.
-            chosen: other attributes of this class.
-        """
+        """Return options of a method of the paper with the orders and delays of ``options``."""
         shared = {
             key: getattr(options, key)
             for key in ("output_order", "input_order", "delay", "friction_limit", "check_columns")

@@ -1,12 +1,8 @@
 r"""Friction laws that the paper's methods take: hard, and with switches of hyperbolic tangents.
 
-A smoothed law is one function of the last state, OP and the frictions,
-
 .. math:: s_k = F(s_{k-1}, u_k, u_{k-1}, f_S, f_D; \tau)
 
-whose first entry is the stem. He's has no other entry; Kano's carries the direction of motion,
-0 at rest. The reconstruction of XCH has the signature of Kano's, so its smoothed form is the same.
-Choudhury's has none: its threshold depends on why the stem stuck.
+The first entry is the stem; Kano's law and XCH's carry the direction of motion besides, 0 at rest.
 """
 
 from __future__ import annotations
@@ -57,13 +53,9 @@ class SmoothLaw:
     step: Step
 
     def stems(self, op: FloatArray, friction: FloatArray, smoothing: FloatArray) -> FloatArray:
-        """Return smoothed stems, shape (m, N), %.
+        """Return smoothed stems, shape (m, N), %, of OP, shape (N, m), %.
 
-        Args:
-            op: shape (N, m), %.
-            friction: rows (f_S, f_D), shape (m, 2), %; negative ones count as 0, f_S below f_D
-                as f_D.
-            smoothing: τ of every valve, shape (m,), 1/%.
+        Negative frictions, rows (f_S, f_D), shape (m, 2), %, count as 0, f_S below f_D as f_D.
         """
         made = np.empty(op.T.shape)
         for j, (static, dynamic) in enumerate(friction.tolist()):
@@ -97,11 +89,7 @@ def smooth_law(name: str) -> SmoothLaw:
 
 
 def final_smoothing(limits: FloatArray) -> FloatArray:
-    """Return τ at which (5) equals (4), shape (m,), 1/%: 10⁴, more where OP spans below 10 %.
-
-    Args:
-        limits: f_max of every valve, shape (m,), %.
-    """
+    """Return τ at which (5) equals (4), shape (m,), 1/%: 10⁴, more where OP spans below 10 %."""
     return np.maximum(SMOOTHING, 10.0 * SMOOTHING / np.maximum(limits, 1e-9))
 
 

@@ -31,11 +31,7 @@ class AlteredProcess(Process):
     def __init__(
         self, inner: Process, effects: tuple[tuple[Behaviour, ...], ...], sample_time: float
     ) -> None:
-        """Put ``effects``, one tuple per output, behind ``inner``.
-
-        Raises:
-            InputError: an effect that is not linear, or not one tuple per output.
-        """
+        """Put ``effects``, one tuple of linear ones per output, behind ``inner``."""
         if len(effects) != len(inner.outputs):
             raise InputError(f"{len(effects)} lists of effects for {len(inner.outputs)} outputs")
         self.inner, self.effects = inner, effects
@@ -103,10 +99,7 @@ def _filter(effect: Behaviour, sample_time: float) -> Filter:
 
 
 def _at_rest(entry: Filter, out: float) -> tuple[FloatArray, float]:
-    """Return the state and the input at which the filter rests at ``out``.
-
-    What has no gain at rest, a leak, starts without memory and ``out`` as its input.
-    """
+    """Return the state and the input at which the filter rests at ``out``."""
     n = len(entry.b)
     shape = np.linalg.lstsq(np.eye(n) - entry.a, entry.b, rcond=None)[0]
     gain = entry.d + float(entry.c @ shape)

@@ -72,12 +72,8 @@ class LinearModel:
             return np.full((len(self.pv0), len(self.stem0)), np.inf)
 
     def step_responses(self, samples: int) -> FloatArray:
-        """Return the responses of outputs to stem steps of 1 % at sample 0, without ``constant``.
+        """Return the responses, shape (N, p, m), of outputs to stem steps of 1 % at sample 0.
 
-        Args:
-            samples: N.
-
-        Returns:
-            Shape (N, p, m), engineering units.
+        The ``constant`` is left out.
         """
         return responses(self.a, self.c, itertools.repeat(self.b, samples))

@@ -24,17 +24,11 @@ def column_name(key: str, tag: str) -> str:
 
 
 def tagged_columns(header: Sequence[str]) -> Mapping[str, Mapping[str, str]]:
-    """Return signal to tag to column of a header that this package wrote.
+    """Return signal to tag to column of a ``header`` that ``write_csv`` wrote; empty for others.
 
     It is the time, OP of every valve, PV of every output and, where they are known, SP of the
     same outputs and the stems of the same valves, each in the same order, and perhaps mode and
-    quality. A header with any other column or order may mean something else.
-
-    Args:
-        header: names of all columns.
-
-    Returns:
-        Signals of :data:`SIGNALS`; empty for any other header.
+    quality.
     """
     found: dict[str, dict[str, str]] = {key: {} for key in SIGNALS}
     for last in (QUALITY, MODE):

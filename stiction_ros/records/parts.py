@@ -20,11 +20,7 @@ ALIKE = 0.01
 
 
 def only_part(parts: Sequence[Record], where: str) -> Record:
-    """Return the one part that there is, with every sample usable.
-
-    Raises:
-        InputError: there are several, or samples that are bad.
-    """
+    """Return the one part that there is; InputError for several, or for bad samples."""
     convert = f"stiction convert writes its {len(parts)} parts as records of their own"
     if len(parts) > 1:
         before, after = parts[0], parts[1]
@@ -48,10 +44,7 @@ def only_part(parts: Sequence[Record], where: str) -> Record:
 
 
 def longest_part(parts: Sequence[Record]) -> Record:
-    """Return the longest stretch of good samples, its notes saying which it is.
-
-    Args:
-        parts: of one source, in their order, one at least.
+    """Return the longest stretch of good samples of one source, its notes saying which it is.
 
     Raises:
         InputError: no good samples.
@@ -79,13 +72,10 @@ def span(*parts: Record) -> str:
 
 
 def joined(parts: Sequence[Record]) -> Record:
-    """Return the parts as one record with gaps between them.
+    """Return the parts of one source, one at least, as one record with gaps between them.
 
     It has the sample time of the longest part; parts with another one, and signals that are
     not in every part, are left out with a note.
-
-    Args:
-        parts: of one source, in their order, one at least.
     """
     if len(parts) == 1:
         return parts[0]

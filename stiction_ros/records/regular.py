@@ -107,11 +107,7 @@ class Part:
 
 
 def split_at_gaps(time: FloatArray) -> list[tuple[int, int]]:
-    """Return first and last (not included) row of each stretch without a gap.
-
-    Args:
-        time: increasing times, shape (N,), s.
-    """
+    """Return first and last (not included) row of each stretch of increasing times without gap."""
     steps = np.diff(time)
     cuts = np.flatnonzero(steps > GAP * float(np.median(steps))) + 1
     edges = [0, *cuts.tolist(), len(time)]
@@ -119,15 +115,11 @@ def split_at_gaps(time: FloatArray) -> list[tuple[int, int]]:
 
 
 def regular_part(time: FloatArray, first: int, last: int) -> Part:
-    """Return rows ``first`` up to ``last`` on a regular grid.
+    """Return rows ``first`` up to ``last`` of increasing times, (rows,), s, on a regular grid.
 
     The sample time is the time from the first row to the last over the places between them.
     Rows are taken as they are when their steps differ by a tenth at most, and when more than a
     tenth of the places would be without a row, or steps stray as much as that makes them.
-
-    Args:
-        time: increasing times of all rows, shape (rows,), s.
-        first, last: the stretch, without a gap inside.
     """
     given = time[first:last]
     plain = Part(first, last, given, np.arange(len(given)))
@@ -203,10 +195,7 @@ def spread_evenly(
 
 
 def _evenly(rows: IntArray) -> NDArray[np.bool_]:
-    """Return which distances of rows are the usual one, or one row off it, shape (R - 1,).
-
-    Halves that are rounded to even make them differ in turn, so two are looked at together.
-    """
+    """Return which distances of rows are the usual one, or one row off it, shape (R - 1,)."""
     if len(rows) < 3:
         return np.zeros(max(len(rows) - 1, 0), dtype=np.bool_)
     usual = float(np.median(rows[2:] - rows[:-2])) / 2.0
@@ -214,19 +203,13 @@ def _evenly(rows: IntArray) -> NDArray[np.bool_]:
 
 
 def _chance_of_even(apart: float) -> float:
-    """Return the chance that a distance of rows lost at random is one row off the usual at most.
-
-    Such distances are geometric.
-    """
+    """Return the chance that a distance of rows lost at random is one row off the usual at most."""
     kept = 1.0 - 1.0 / apart
     return float(kept ** max(np.ceil(apart - 1.0) - 1.0, 0.0) - kept ** np.floor(apart + 1.0))
 
 
 def _of_late(steps: FloatArray) -> IntArray:
-    """Return how many places each step takes, shape (rows - 1,): one for all but holes.
-
-    A step of n places is one of a late row when the n - 1 steps before or after make up for it.
-    """
+    """Return how many places each step takes, shape (rows - 1,): one for all but holes."""
     elapsed = float(steps.sum())
     counts = np.ones(len(steps), dtype=np.int64)
     seen: set[int] = set()
@@ -243,12 +226,7 @@ def _of_late(steps: FloatArray) -> IntArray:
 
 
 def _of_rounded(given: FloatArray) -> IntArray | None:
-    """Return how many places each step takes where the stamps have too few digits, or None.
-
-    Then steps are multiples of the last digit, and those of two come evenly: one more each time
-    that the scan has run ahead of the digits. Missing rows do not come evenly. A step takes the
-    fewest places with which all stamps so far are within half a digit of regular times.
-    """
+    """Return how many places each step takes where the stamps have too few digits, or None."""
     steps = np.diff(given)
     turns = steps / float(steps.min())
     whole = np.rint(turns)

@@ -19,15 +19,12 @@ TOLERATED = 0.1
 def sample_time(
     time: FloatArray, where: str, place: Callable[[int], str]
 ) -> tuple[float, tuple[str, ...]]:
-    """Return the sample time and notes on it.
+    """Return the seconds between two samples, and one note when the jitter is more than rounding.
 
     Args:
         time: times of the N samples in s, shape (N,).
         where: file or bag, for errors.
         place: names a sample for errors, ``place(3)`` → ``line 5``.
-
-    Returns:
-        Seconds between two samples, and one note when the jitter is more than rounding.
 
     Raises:
         InputError: fewer than two samples, time that does not increase, a gap.
@@ -65,12 +62,9 @@ def sample_time(
 
 
 def shortest(first: float, last: float, steps: int, tolerance: float) -> float:
-    """Return the shortest decimal that is the step from one time to another, s.
+    """Return the shortest decimal that is the step, s, of ``steps`` steps from one time to another.
 
-    Args:
-        first, last: times, s.
-        steps: between them.
-        tolerance: steps by which the last time may be moved.
+    The last time may be moved by ``tolerance`` steps.
     """
     mean = float(last - first) / steps
     for digits in range(1, 15):

@@ -57,14 +57,10 @@ class Whole:
     mask: QualityArray | None = None
 
     def records(self, source: Source, notes: Sequence[str] = ()) -> tuple[Record, ...]:
-        """Return one record for each stretch without a gap.
+        """Return one record for each stretch without a gap, with ``notes`` before its own.
 
         A step of more than 5.5 usual ones is a gap. Each row is a sample, also
         where its stamp is slightly off; short holes are held, and the mask says where.
-
-        Args:
-            source: of the samples.
-            notes: to put before those of every record.
 
         Raises:
             InputError: fewer than two rows, or samples that are irregular.

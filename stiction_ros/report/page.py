@@ -14,13 +14,9 @@ Cell = str | tuple[str, str]
 
 
 def page_file(out: str | Path) -> tuple[Path, Path | None]:
-    """Return the file of a page, and the folder for what stands beside it.
+    """Return the file of a page, and the folder for what stands beside it; folders are made.
 
-    Args:
-        out: a folder, or an ``.html`` file that stands alone; folders are made.
-
-    Returns:
-        The file, and the folder; None for a page that stands alone.
+    An ``.html`` file stands alone, without a folder.
     """
     out = Path(out)
     alone = out.suffix.lower() == ".html"

@@ -38,13 +38,7 @@ NEAR_LIMIT = 1e-6
 
 @dataclasses.dataclass(frozen=True)
 class Assessed:
-    """What is said of one loop.
-
-    Attributes:
-        entry: its row.
-        page: HTML of its page; empty where none was wanted or there is nothing to show.
-        log: decisions in their order, one sentence each.
-    """
+    """What is said of one loop: its row, HTML of its page, which may be empty, and decisions."""
 
     entry: Entry
     page: str = ""

@@ -23,11 +23,9 @@ sample; two cycles of their own that part by half a turn within the record come 
 
 
 def beats(error: FloatArray, period: float) -> FloatArray:
-    """Return the samples, not whole, at which PV − SP sets out upwards through its slow mean.
+    """Return the samples, not whole, at which PV − SP, (N,), sets out upwards through its mean.
 
-    Args:
-        error: shape (N,).
-        period: samples.
+    The mean is a slow one over cycles of ``period`` samples.
     """
     moved = moving(error, period)
     rows = []
@@ -39,10 +37,7 @@ def beats(error: FloatArray, period: float) -> FloatArray:
 
 
 def locked(one: FloatArray, other: FloatArray) -> bool:
-    """Tell whether two loops keep the same time: each begins its cycle at one phase of the other.
-
-    Args:
-        one, other: beats, s on one clock.
+    """Tell whether two loops' beats, s on one clock, keep the same time: one begins at one phase.
 
     References:
         K. V. Mardia, P. E. Jupp: Directional Statistics, Wiley 2000, section 2.3.

@@ -1,9 +1,7 @@
 """Loops that cycle together, the likely source first.
 
-A valve that makes its own loop cycle moves what lies around it at its period and never the other
-way round, so a loop whose cause is its valve comes first; then one that rings by its tuning; a
-loop that only bears a wave from outside comes last. Among equals the more regular one is nearer
-to the source: what the cycle passes through adds noise.
+A valve that makes its own loop cycle moves what lies around it at its period, so its loop comes
+first; then one that rings by its tuning; last what only bears a wave. The more regular is nearer.
 """
 
 from __future__ import annotations

@@ -110,9 +110,6 @@ def survey(
         plan: how.
         engine: where; it is closed at the end, whatever happens.
         progress: called after each loop.
-
-    Raises:
-        InputError: a folder that cannot be written or holds another survey.
     """
     if plan.out is None:
         if plan.resume:

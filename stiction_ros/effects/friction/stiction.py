@@ -1,7 +1,4 @@
-"""What a law of stiction is, and what a controller sees of it that moves OP in steps.
-
-To such a controller a stem stays, or it jumps.
-"""
+"""What a law of stiction is, and what a controller sees of it that moves OP in steps."""
 
 from __future__ import annotations
 
@@ -104,10 +101,7 @@ class JumpForm:
     def margin(self, spread: FrictionSpread | None, share: float, floor: float) -> float:
         """Return by how much a planned jump exceeds the smallest one, %.
 
-        Args:
-            spread: half-widths of the intervals; None where there are none.
-            share: of f_S, taken when there are none.
-            floor: least share of f_S when there are.
+        It is the half-widths of the intervals, at least ``floor`` of f_S; without any ``share``.
         """
         if spread is None:
             wanted = share * self.static_friction
@@ -150,11 +144,7 @@ class Stiction(Behaviour):
     )
 
     def jump_form(self) -> JumpForm | None:
-        """Return the moves that it can make when OP rests between them.
-
-        Returns:
-            None for a law that has no such form, and so no OP can be planned for it.
-        """
+        """Return the moves that it can make when OP rests between them; None for no form."""
         return None
 
     def figures(self) -> dict[str, float]:

@@ -63,11 +63,7 @@ class Sheet(abc.ABC):
 
     @abc.abstractmethod
     def pieces(self, rows: int | None = None) -> Iterator[Piece]:
-        """Yield the data, so many ``rows`` at a time; None takes :data:`PIECE` cells.
-
-        Raises:
-            InputError: the file is damaged.
-        """
+        """Yield the data, so many ``rows`` at a time; None takes :data:`PIECE` cells."""
 
     def find(self, name: str) -> int | None:
         """Return the index of the one column ``name``, exact case first; None if absent."""

@@ -68,9 +68,6 @@ def magic(path: Path) -> bytes:
 def open_text(path: Path) -> Iterator[io.TextIOBase]:
     """Open a text file, gzip or Zstandard unpacked: UTF-8, UTF-16, or Western European bytes.
 
-    Args:
-        path: the file; what it is packed in is told by its first bytes.
-
     Raises:
         InputError: no such file, no text, an archive, or packed data that is cut off, also
             while it is read.

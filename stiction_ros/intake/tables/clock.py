@@ -54,11 +54,7 @@ ROWS_APART = TimeColumn(-1)
 
 
 def time_column(sheet: Sheet, name: str | None) -> TimeColumn:
-    """Return the column of times: the one named, or the first with a usual name.
-
-    Raises:
-        InputError: there is none.
-    """
+    """Return the column of times: the one named, or the first with a usual name."""
     if name is not None:
         return TimeColumn(sheet.column(name, "--time COLUMN"))
     for date, clock in itertools.product(("date", "datum"), ("time", "zeit", "uhrzeit")):

@@ -61,11 +61,7 @@ class Plan:
 
 
 def plan_of(sheet: Sheet, options: IntakeOptions, tags: TagList | None) -> Plan:
-    """Return what the columns of a table are.
-
-    Raises:
-        InputError: a column is missing or there twice, or the options do not fit.
-    """
+    """Return what the columns of a table are; InputError for missing or repeated ones."""
     empty: Sequence[Cells] = [[] for _ in sheet.layout.header]
     top = next((columns for columns, _ in sheet.pieces(LOOKED_AT)), empty)
     if options.long is None and (options.columns.op or options.columns.pv):

@@ -99,10 +99,7 @@ def _is_bad(text: str, kind: str) -> bool | None:
 
 
 def _bad_codes(codes: dict[str, float], kind: str) -> dict[str, bool | None]:
-    """Return which numbers tell of bad values; None for those not known.
-
-    A value that is surer to be bad than good, below half of the whole, is bad.
-    """
+    """Return which numbers tell of bad values; None for those not known."""
     most = max(codes.values(), default=0.0)
     if kind in ("good", "bad"):
         return {word: (code != 0.0) == (kind == "bad") for word, code in codes.items()}

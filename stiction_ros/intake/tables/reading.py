@@ -31,11 +31,7 @@ Reader = tuple[int, Numbers] | tuple[int, Words]
 def blocks_of(
     sheet: Sheet, plan: Plan, options: IntakeOptions, tags: TagList | None
 ) -> dict[str, list[Block]]:
-    """Read a table into blocks, by the name of their loop.
-
-    Raises:
-        InputError: times that cannot be read, or the file is damaged.
-    """
+    """Read a table into blocks, by the name of their loop."""
     if plan.long is not None:
         return _long(sheet, plan, plan.long, options, tags)
     return _beside(sheet, plan, options)

@@ -57,11 +57,7 @@ class TagList:
         return self.loops.get(folded(name))
 
     def way_of(self, path: Path, options: IntakeOptions) -> FileWay:
-        """Return how a file is read.
-
-        Raises:
-            InputError: its rows contradict each other, or have a tag twice.
-        """
+        """Return how a file is read; InputError if its rows contradict each other."""
         rows = self.rows_of(path)
         said: dict[str, Any] = {}
         for row in rows:
@@ -110,10 +106,6 @@ def read_tag_list(path: Path) -> TagList:
 
     A column ``op_unit`` may say ``percent``, ``share`` or ``ma``. A row with a ``file`` counts
     for that file alone, and may have ``time``, ``dates``, ``time_unit`` and ``sample_time``.
-    Other columns are ignored.
-
-    Raises:
-        InputError: it cannot be read, has other columns, or a tag twice.
     """
     with foreign(path):
         rows = read_rows(path)

@@ -192,12 +192,9 @@ class Evidence:
             self._gains.append(np.column_stack(gains))
 
     def stems(self, valve: int, first: int, grid: FloatArray) -> FloatArray:
-        """Return stems of ``valve`` from ``first`` on by its law, shape (n − first, G), %.
+        """Return stems of ``valve`` by its law from ``first`` on, shape (n − first, G), %.
 
-        Args:
-            valve: index.
-            first: sample at whose beginning the stem rests where it is trusted to be.
-            grid: rows (f_S, f_D), %, shape (G, 2).
+        There the stem rests where it is trusted to be; ``grid`` has rows (f_S, f_D), %, (G, 2).
         """
         law = self._laws[valve]
         further = [getattr(law, entry.attribute) for entry in law.parameters()[2:]]
@@ -206,12 +203,7 @@ class Evidence:
         return simulate(find_law(str(law.law)), grid, op, start, further)
 
     def signature(self, valve: int, stems: FloatArray) -> list[FloatArray]:
-        """Return what the stems of ``valve`` would change, per output, in σ.
-
-        Args:
-            valve: index.
-            stems: other positions, shape (n,) or (n, G), %.
-        """
+        """Return what other ``stems``, (n,) or (n, G), %, would change, per output, in σ."""
         trusted = self.stem[:, valve] if stems.ndim == 1 else self.stem[:, valve, None]
         name = self.reference.valves[valve]
         return [output.response(name, stems - trusted) for output in self.reference.outputs]
@@ -264,11 +256,9 @@ class Evidence:
     def slope(
         self, signature: list[FloatArray], direction: list[FloatArray], first: int
     ) -> tuple[float, float] | None:
-        """Return how far along ``direction`` the innovations lie beyond ``signature``.
+        """Return how far along ``direction`` innovations lie beyond ``signature``, and the error.
 
-        Returns:
-            The step and its standard error, by least squares from sample ``first`` on with the
-            gains left open; None where the direction shows nowhere.
+        By least squares from sample ``first`` on, gains open; None where it shows nowhere.
         """
         top = bottom = 0.0
         for seen, change, along, gains in zip(

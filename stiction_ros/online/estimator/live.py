@@ -66,11 +66,7 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
         return (LAW_METHOD, METHOD) if self.law == AUTO else (METHOD,)
 
     def options(self) -> IdentificationOptions:
-        """Return what :func:`stiction_ros.identification.identify` is asked.
-
-        Raises:
-            InputError: no such law, or one that cannot be followed sample by sample.
-        """
+        """Return the options of ``identify``; a law that has no steps is refused."""
         if self.law != AUTO and find_law(self.law).switching is None:
             raise InputError(
                 f"{self.law} is not identified in a running loop: every slip hangs on the one "
@@ -150,11 +146,7 @@ class LiveEstimator:
         outputs: Sequence[str],
         sample_time: float,
     ) -> None:
-        """Start with an empty window.
-
-        Raises:
-            InputError: settings that no fit can use.
-        """
+        """Start with an empty window; settings that no fit can use are refused."""
         settings.options()
         self.settings = settings
         self.loop, self.sample_time = loop, sample_time
@@ -172,11 +164,7 @@ class LiveEstimator:
         self._changed: dict[str, _Change] = {}
 
     def retune(self, settings: EstimatorSettings) -> None:
-        """Change settings from the next sample on; window and trust are kept.
-
-        Raises:
-            InputError: settings that no fit can use; the old ones stay in force.
-        """
+        """Change settings from the next sample on; window and trust are kept, also when refused."""
         settings.options()
         self.settings = settings
         self._trust.retune(settings)

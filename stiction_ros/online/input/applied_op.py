@@ -50,11 +50,9 @@ class AppliedOp:
         return self._told[max(found)].op if found else None
 
     def before(self, stamp: int, own_in_time: bool) -> Given:
-        """Return what was given at the sample before that of ``stamp``, and forget older ones.
+        """Return what was given at the sample before that of ``stamp``, ns, and forget older ones.
 
-        Args:
-            stamp: ns.
-            own_in_time: whether the controller's OP for that sample went out within a period.
+        The controller's ``own`` OP may have gone out within a period, or later.
         """
         half = self._step // 2
         wanted = [told for told in self._told if abs(told - stamp + self._step) <= half]

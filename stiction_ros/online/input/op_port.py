@@ -59,13 +59,9 @@ class OpPort:
         self._last: int | None = None
 
     def judge(self, sender: str, stamp: int, op: FloatArray | None, present: int) -> Reception:
-        """Return whether an OP is taken.
+        """Return whether an OP of a ``sender`` for a ``stamp``, ns, is taken at the present one.
 
-        Args:
-            sender: full name that it bears; empty when it bears none.
-            stamp: of the sample that it is for, ns.
-            op: shape (m,), or None when it has not a value for each valve.
-            present: stamp of the present sample, ns.
+        It is None where it has not a value for each valve.
         """
         found = self._reception(sender, stamp, op, present)
         self.counts[found] += 1

@@ -58,12 +58,7 @@ class GapFinding:
 def find_in_window(model: LoopModel, record: Record) -> GapFinding:
     """Run the workflow, without bootstraps, on a window of a running loop.
 
-    Args:
-        model: the loop as it is known.
-        record: the window; its ``start`` counts from the first sample of the run.
-
-    Raises:
-        InputError: as :func:`stiction_ros.discrepancy.find_discrepancy`.
+    The ``start`` of the record counts from the first sample of the run.
     """
     found = find_discrepancy(model, [record], GapOptions(quick=True))
     effects = tuple(_effect(effect, record.start) for effect in found.effects)

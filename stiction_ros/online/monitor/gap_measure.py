@@ -85,11 +85,6 @@ def begun_at_stems(model: LoopModel, record: Record, count: int) -> Record:
 
     A free run takes a stem to be where OP is at its first sample. A sticky valve seldom is, so
     the valves' effects are run over all samples before. With ideal valves nothing is replaced.
-
-    Args:
-        model: whose valves are run.
-        record: the window and what came before it.
-        count: samples of the window.
     """
     first = max(len(record) - count, 0)
     part = record.part(first, len(record))
@@ -109,8 +104,7 @@ def baseline_of(model: LoopModel, record: Record) -> tuple[OutputBaseline, ...]:
     """Return the noise of every output in the baseline.
 
     Raises:
-        InputError: a record that does not fit the model, or a model whose free run grows
-            without bound.
+        InputError: another loop's record, or a model whose free run grows without bound.
     """
     run = FreeRun(model, join_records(model, [record]))
     return tuple(_output_baseline(run, i) for i in range(len(model.outputs)))

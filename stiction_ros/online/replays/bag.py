@@ -122,12 +122,8 @@ class ReplayBag:
 def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> ReplayBag:
     """Read what a replay needs from a bag, in one pass.
 
-    Args:
-        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
-        namespace: of the loop; needed when the bag holds several loops.
-
-    Raises:
-        InputError: no such bag, damaged, without ``pv`` and ``op``, or of several loops.
+    The ``namespace`` of the loop is needed when the bag holds several. A damaged bag, or one
+    without ``pv`` and ``op``, is refused.
     """
     notes: list[str] = []
     messages = list(read_messages(path, wanted=_wanted, notes=notes))

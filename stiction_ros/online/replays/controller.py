@@ -33,12 +33,9 @@ class Offer:
 
 @dataclasses.dataclass(frozen=True)
 class OpMatch:
-    """How the recorded ``op`` and the replayed ones compare.
+    """How the recorded and the replayed ``op`` compare at the samples at which both are there.
 
-    Attributes:
-        compared: samples at which both are there.
-        equal: how many of them agree in every bit.
-        first_difference: which sample differs first and how; empty when none does.
+    Some are equal in every bit; of the first other one it is told which, and how.
     """
 
     compared: int = 0
@@ -75,9 +72,6 @@ def replay_controller(
         settings, model: as the node had them.
         offers: loop models of the estimator in their order.
         origin: stamp of sample 0 of the run, ns.
-
-    Raises:
-        InputError: settings that do not fit the model.
     """
     live = ValveTestingController(settings, model)
     recorded = _recorded_op(bag, model)
@@ -122,11 +116,7 @@ def _offer(live: LiveController, offer: Offer, first: int, notes: list[str]) -> 
 def _samples(
     bag: ReplayBag, settings: ControllerNodeSettings, model: LoopModel, notes: list[str]
 ) -> Iterator[Sample]:
-    """Yield every sample that has all the controller waits for, oldest first.
-
-    In realtime a sample without a recorded ``op`` was passed over, and one without ``pv`` was
-    stepped without; in lockstep every one was answered.
-    """
+    """Yield every sample that has all the controller waits for, oldest first."""
     lockstep = settings.pace == "lockstep"
     pv, dv = _by_stamp(bag, "pv", model.outputs), _disturbances(bag, model)
     op, given = _recorded_op(bag, model), _given(bag, model)

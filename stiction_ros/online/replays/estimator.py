@@ -192,11 +192,7 @@ class ReplayedEstimator:
 
 
 def identification_of(mapping: Mapping[str, Any]) -> Identification:
-    """Return the identification that a mapping of ``identify --json`` tells, without stems.
-
-    Raises:
-        InputError: the mapping does not hold what an identification needs.
-    """
+    """Return the identification that a mapping of ``identify --json`` tells, without stems."""
     try:
         return Identification(
             status=FitStatus(mapping["model"]["status"]),

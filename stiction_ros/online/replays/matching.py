@@ -19,10 +19,7 @@ _TIMES = ("seconds",)  # wall time of a fit is another each time
 def match_fit(bag: ReplayBag, fit: ReplayedFit, trust_known: bool = True) -> FitMatch:
     """Compare one fit with ``stiction``, ``loop_model`` and the fit told in ``/diagnostics``.
 
-    Args:
-        bag, fit: what was recorded and what the replay gives.
-        trust_known: whether trust was built on all fits of the run; otherwise only the fit
-            itself is compared, not what is trusted after it.
+    Where trust was not built on all fits of the run, what is trusted after it is not compared.
     """
     if not fit.whole:
         taken = "" if fit.update is None else ", the recorded fit is taken"

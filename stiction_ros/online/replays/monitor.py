@@ -16,8 +16,7 @@ from stiction_ros.texts import json_text
 def match_monitor(bag: ReplayBag, estimator: ReplayedEstimator) -> MonitorMatch | None:
     """Compare measurements and findings by the end of their window; None without a monitor.
 
-    A window that was still being looked into when the node ended is not in the bag and not
-    compared; everything that is in the bag must come again.
+    Of the bag everything must come again; what the node was still looking into is not in it.
     """
     if not estimator.settings.monitor:
         return None

@@ -44,8 +44,7 @@ def replay(
         progress: told the share of the messages that the estimator has taken in.
 
     Raises:
-        InputError: no such bag, no configuration of an estimator in it, or settings that this
-            version cannot use.
+        InputError: no such bag, no configuration of an estimator in it, or unusable settings.
     """
     bag = read_replay_bag(path, namespace=namespace)
     if bag.estimator is None:
@@ -127,10 +126,7 @@ def _control(
 def _offers(
     bag: ReplayBag, estimator: ReplayedEstimator, first: int, step: int
 ) -> tuple[Offer, ...]:
-    """Return the recorded loop models of fits before the bag, then the replayed ones.
-
-    A model takes effect at its ``valid_from``, or where it came in the bag if that is later.
-    """
+    """Return the recorded loop models of fits before the bag, then the replayed ones."""
     origin, latency = estimator.origin, estimator.settings.fit_latency * step
     begin = max((first - origin) // step, 0)
     came = {model.valid_from: model.ops_before + begin for model in bag.models}

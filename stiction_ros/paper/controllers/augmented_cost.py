@@ -61,14 +61,7 @@ class AugmentedCost:
         frictions: Sequence[PrintedFriction | None],
         bounds: FloatArray | None = None,
     ) -> None:
-        """Condense.
-
-        Args:
-            model: the process.
-            weights: of (22).
-            frictions: one entry per valve, None for a healthy one.
-            bounds: soft bounds of the outputs, shape (p, 2), infinite for none; None for none.
-        """
+        """Condense, for ``frictions`` with None for a healthy valve and ``bounds``, (p, 2)."""
         self.model, self.weights, self.frictions = model, weights, tuple(frictions)
         self.part = HorizonCost(model, weights.in_stems)
         self.horizon = weights.horizon

@@ -71,12 +71,7 @@ class PrintedEmbeddingMpc(Formulation):
         limits: HorizonLimits,
         frictions: Sequence[Behaviour | None],
     ) -> None:
-        """Build the programme once.
-
-        Raises:
-            InputError: no sticky valve, a law without a smoothed form, or bounds that this
-                formulation does not know.
-        """
+        """Build the programme once; InputError for valves or bounds that it does not know."""
         known = printed_frictions(frictions)
         _check(limits, known)
         self.tuning, self.frictions = tuning, known

@@ -22,9 +22,6 @@ def as_printed(
     """Return the formulation of Section 4.2 to the letter; ``tuning`` is that of the embedding.
 
     The others are as :attr:`~stiction_ros.control.design.ControlDesign.others` is called.
-
-    Raises:
-        InputError: it cannot be set up for these valves.
     """
     if mode is ControlMode.EMBEDDING:
         return PrintedEmbeddingMpc(unaware.cost.model, tuning, unaware.limits, frictions)

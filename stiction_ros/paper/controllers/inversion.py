@@ -30,11 +30,7 @@ class PrintedInversionMpc(Formulation):
     mode = ControlMode.INVERSION
 
     def __init__(self, linear: UnawareMpc, frictions: Sequence[Behaviour | None]) -> None:
-        """Wrap ``linear``; ``frictions`` has one entry per valve, None for a healthy one.
-
-        Raises:
-            InputError: a law that :mod:`.laws` does not know, or rate limits.
-        """
+        """Wrap ``linear``; ``frictions`` has one entry per valve, None for a healthy one."""
         if np.isfinite(linear.limits.move).any():
             raise InputError(
                 "the paper's inversion knows no rate limits",

@@ -77,15 +77,7 @@ class SmoothedProgramme:
         limits: FloatArray,
         soft: SoftOutputs | None = None,
     ) -> None:
-        """Build.
-
-        Args:
-            model: the process.
-            tuning: weights, τ and iteration limit.
-            frictions: one entry per valve, None for a healthy one.
-            limits: of stems and OP, shape (m, 2), %.
-            soft: bounds of the outputs; None for none.
-        """
+        """Build, for ``frictions`` with None for a healthy valve and ``limits``, (m, 2), %."""
         self.model, self.tuning, self._soft = model, tuning, soft
         self._sticky = [j for j, friction in enumerate(frictions) if friction is not None]
         pairs = [friction for friction in frictions if friction is not None]
@@ -161,9 +153,7 @@ class SmoothedProgramme:
     def solve(self, situation: PlanProblem, op: FloatArray, stems: FloatArray) -> ProgrammeResult:
         """Return the local optimum that IPOPT reaches.
 
-        Args:
-            situation: estimate and target.
-            op, stems: the start, shape (N, m) each, %, stems under the hard model.
+        The start are OP and the stems by the hard model, shape (N, m) each, %.
         """
         target = situation.target
         state = situation.state - target.state

@@ -89,9 +89,7 @@ class FrictionProgramme:
     def fitted(self, friction: FloatArray, smoothing: FloatArray) -> tuple[FloatArray, float]:
         """Return unknowns with the least-squares coefficients of these frictions, and (12a).
 
-        Args:
-            friction: rows (f_S, f_D), shape (m, 2), %.
-            smoothing: τ of every valve, shape (m,), 1/%.
+        The frictions are rows (f_S, f_D), shape (m, 2), %; τ is one a valve, 1/%.
         """
         span, data = self.data.op_span, self.data
         stems = np.array(self._stems(friction / span[:, None], smoothing * span))
@@ -110,13 +108,9 @@ class FrictionProgramme:
         return x, total / self.frame.outputs
 
     def solve(self, x: FloatArray, smoothing: FloatArray) -> Solution:
-        """Run IPOPT once, then solve the coefficients with the frictions held.
+        """Run IPOPT once from ``x``, then solve the coefficients with the frictions held.
 
         The last is linear least squares; it completes what an iteration limit cut short.
-
-        Args:
-            x: start.
-            smoothing: τ of every valve, shape (m,), 1/%.
         """
         count = 2 * self.frame.valves
         low, high = np.full(self.frame.size, -np.inf), np.full(self.frame.size, np.inf)

@@ -1,8 +1,6 @@
 """The nonlinear programme (12) within the paper's M × T runs of IPOPT.
 
-Every run solves the programme in the frictions alone (:mod:`.reduced_programme`). Points of the
-border, of the line of S_0 and from inside the triangle are ranked by their own (12a), one
-linear least squares each; none of them is a round number on purpose. Then, until M runs for each
+Points of the triangle are ranked by their own (12a). Then, until M runs for each
 of T choices of delays are spent:
 
 1. every choice of delays is solved from its best points, far apart, with a third of the runs;
@@ -73,11 +71,6 @@ def identify_by_programme(
     record: Record, options: PaperOptions | None = None, progress: Progress | None = None
 ) -> PaperIdentification:
     """Identify by the nonlinear programme (12); see the module for the order of work.
-
-    Args:
-        record: what was measured.
-        options: orders, delay range, ``starts``; None for the defaults.
-        progress: called with the share done, 0 to 1.
 
     Returns:
         Point estimates without a verdict, and in ``search`` every run with its end. Its

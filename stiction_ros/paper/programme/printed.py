@@ -1,8 +1,6 @@
 """The paper's method to the letter: the programme (12) from M printed starts, for T delays.
 
-M × T runs of IPOPT at τ = 10⁴, each over frictions and coefficients together with exact
-derivatives, from the border of the triangle, the line of S_0 and the ARX start (15). The best
-feasible, stable end wins. :mod:`.nlp` spends as many runs better.
+The best feasible, stable end of M × T runs of IPOPT at τ = 10⁴ wins; :mod:`.nlp` uses them better.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""Where the nonlinear programme starts.
-
-As printed: the border of the triangle and a few points of the line f_S + f_D = S_0. For the search
-of :mod:`.nlp` points inside the triangle are added, and all are ranked by their own (12a).
-"""
+"""Where the nonlinear programme starts: border and line f_S + f_D = S_0 as printed, and inside."""
 
 from __future__ import annotations
 
@@ -68,10 +64,7 @@ def stiction_line(stiction: float, limit: float, count: int) -> FloatArray:
 
 
 def inside(limit: float, count: int) -> FloatArray:
-    """Return ``count`` points spread evenly over the triangle, shape (count, 2), %.
-
-    None of them is a round number but by accident, so that a round truth has no advantage.
-    """
+    """Return ``count`` points, none of them round, over the triangle, shape (count, 2), %."""
     square = (0.5 + np.arange(1, count + 1)[:, None] * EVEN) % 1.0
     return limit * np.column_stack([square.max(axis=1), square.min(axis=1)])
 
@@ -105,11 +98,6 @@ def draw_starts(limits: FloatArray, stictions: FloatArray, count: int) -> tuple[
     border. With several valves, valve j takes the list moved on by j, so that the valves do
     not all start at the same kind of point. A valve without an ellipse (S_0 = 0) starts
     on the border only.
-
-    Args:
-        limits: f_max per valve, shape (m,), %.
-        stictions: S_0 per valve, shape (m,), %; 0 where no ellipse was found.
-        count: M ≥ 1.
     """
     on_line = min(MAX_LINE, count // 2)
     rows, kinds = [], []

@@ -34,15 +34,7 @@ COMPRESSIONS = {
 
 @dataclasses.dataclass(frozen=True)
 class Packing:
-    """How a finished file is packed.
-
-    Attributes:
-        compression: ``zstd``, ``lz4`` or ``none``.
-        chunk_size: bytes of messages in one chunk before compression.
-
-    Raises:
-        InputError: another compression.
-    """
+    """How a finished file is packed: ``zstd``, ``lz4`` or ``none``, and bytes in a chunk."""
 
     compression: str = "zstd"
     chunk_size: int = 1 << 18
@@ -89,10 +81,6 @@ def finish_bag(directory: str | Path, packing: Packing = Packing()) -> tuple[str
 
     A journal is replaced when the new file is complete on the disk, so that a second kill
     loses nothing either.
-
-    Args:
-        directory: a bag whose writer has ended, by itself or by a kill.
-        packing: of the finished files.
 
     Returns:
         What was left out, one sentence each; empty when nothing was.
@@ -142,10 +130,6 @@ def rewrite(
         packing: of the new file.
         cap: first simulated time of the bag, ns; until it comes messages get it as log time.
         salvage: leave out what is damaged, with a note, instead of raising.
-
-    Raises:
-        InputError: damaged.
-        OSError: the storage refuses.
     """
     scan = McapScan(path, salvage=salvage)
     partial = path.with_suffix(".mcap.part")

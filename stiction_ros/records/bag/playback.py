@@ -49,11 +49,7 @@ class BagContent:
 
 
 def bag_content(path: str | Path, wanted: str = ".*") -> BagContent:
-    """Read a bag.
-
-    Args:
-        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
-        wanted: regular expression of the full topic names that count.
+    """Read the messages of a bag whose full topic names the regular expression ``wanted`` matches.
 
     Raises:
         InputError: no such bag, damaged, no regular expression, or no message to play.
@@ -79,9 +75,6 @@ def offered_qos(topic: BagTopic) -> Qos:
     Where several publishers offered different profiles it is reliable, or transient local, as
     soon as one of them was, with the largest depth. Without a recorded profile it is reliable
     and volatile. Deadlines and lifespans are not offered: a replay does not keep them.
-
-    Raises:
-        InputError: the recorded profiles cannot be read.
     """
     try:
         profiles = [
@@ -179,10 +172,7 @@ class Playback:
         self.paused = False
 
     def next_messages(self) -> list[RawMessage]:
-        """Return every message of the next log time.
-
-        Only a paused playback steps; a running one returns nothing.
-        """
+        """Return every message of the next log time; a running playback gives none."""
         found: list[RawMessage] = []
         if not self.paused:
             return found

@@ -1,8 +1,6 @@
-"""What a bag says of the run that it holds: configurations, loop model, seed, versions.
+"""What a bag says of the run that it holds, in MCAP metadata records named ``stiction_run``.
 
-The recorder keeps it in MCAP metadata records named ``stiction_run``, so that it survives
-splitting, cutting and conversion, where the first messages of a topic may be gone. While
-the bag grows each record tells what is new; a finished file has one with everything.
+So it survives splitting, cutting and conversion. While a bag grows each record tells what is new.
 """
 
 from __future__ import annotations
@@ -30,9 +28,6 @@ def run_metadata(path: str | Path) -> dict[str, str]:
     Keys: ``config:/plant`` and so on with the text on ``~/config``; ``loop_model:/loop_model``
     with the last text there; ``seed`` and ``version`` as the configurations give them;
     ``recorder`` with the version that wrote the bag.
-
-    Raises:
-        InputError: no such bag, or damaged.
     """
     found: list[tuple[str, dict[str, str]]] = []
     for file in storage_files(path):
@@ -59,13 +54,7 @@ def may_tell(topic: str, type_name: str) -> bool:
 
 
 def news(topic: str, type_name: str, data: bytes) -> dict[str, str]:
-    """Return what a message tells of the run; empty for all but configurations and models.
-
-    Args:
-        topic: full name.
-        type_name: ``std_msgs/msg/String`` is looked at.
-        data: the serialised message (CDR).
-    """
+    """Return what a serialised message tells of the run, a configuration or model, else empty."""
     text = string_of(data) if may_tell(topic, type_name) else None
     if text is None:
         return {}

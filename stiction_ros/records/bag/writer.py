@@ -1,11 +1,6 @@
 """Writes a rosbag2 directory that survives the death of its writer.
 
-While it runs, ``<dir>_0.mcap`` is a journal: every message is one unchunked record, handed
-to the operating system before :meth:`BagWriter.write` returns, so that a killed process
-loses nothing that it had written. At the limits that :class:`Splitting` sets the next file,
-``<dir>_1.mcap``, begins. :meth:`BagWriter.close` lets :func:`finish_bag` rewrite the
-journals chunked, compressed and indexed and adds ``metadata.yaml``; the same function
-repairs the bag of a writer that was killed.
+While it runs, ``<dir>_0.mcap`` is a journal; :func:`finish_bag` makes a finished bag of it.
 """
 
 from __future__ import annotations
@@ -62,17 +57,14 @@ class _Entry:
 class BagWriter:
     """A rosbag2 bag (MCAP storage) being written; also a context manager.
 
+    Every message is one unchunked record, handed to the operating system before :meth:`write`
+    returns. One thread writes. Times are integers in nanoseconds. What ``~/config`` and
+    ``loop_model`` say is kept as metadata of the run too.
+
     Args:
         directory: the bag; made with its parents, must not hold anything yet.
         packing: of the finished bag.
         splitting: when the next file begins.
-
-    What ``~/config`` and ``loop_model`` say is kept as metadata of the run too, see
-    :mod:`stiction_ros.records.bag.run_metadata`. One thread writes. Times are integers in
-    nanoseconds.
-
-    Raises:
-        InputError: the directory holds something already.
     """
 
     def __init__(
@@ -113,13 +105,10 @@ class BagWriter:
 
         Args:
             name: full topic name.
-            type: ``sensor_msgs/msg/JointState``.
+            type: ``sensor_msgs/msg/JointState``; a topic that is there with another is refused.
             definition_text: definition with dependencies, see :func:`definition`.
             type_hash: ``RIHS01_…`` or empty.
             qos: what its publishers offer, one profile or one for each.
-
-        Raises:
-            InputError: the topic is there already with another type.
         """
         self._open()
         profiles = (qos,) if isinstance(qos, Qos) else tuple(qos)
@@ -140,13 +129,12 @@ class BagWriter:
         """Write one serialised message (CDR); it is safe from a kill when this returns.
 
         Args:
-            topic: a name given to :meth:`add_topic`.
+            topic: a name given to :meth:`add_topic`; another one is refused.
             data: the bytes of a raw subscription.
             log_time: when it was received, ns; simulated time when there is a clock.
             publish_time: when it was sent, ns.
 
         Raises:
-            InputError: a topic that was not announced.
             OSError: the storage refuses, a full disk for example.
         """
         try:
@@ -167,15 +155,9 @@ class BagWriter:
         self._journal.put(Metadata(metadata=dict(mapping), name=name))
 
     def put_back(self) -> str:
-        """Write again what somebody has removed while it was being recorded.
+        """Write again what somebody has removed meanwhile; return a sentence, empty for none.
 
         Of the present file nothing is lost; files that were complete cannot be written again.
-
-        Returns:
-            What was found and done, one sentence; empty when everything is there.
-
-        Raises:
-            OSError: the storage refuses, or another file stands in the way.
         """
         if self._journal.is_there:
             return ""
@@ -191,11 +173,7 @@ class BagWriter:
         return f"{said}; {len(gone)} files before it are lost" if gone else said
 
     def close(self) -> None:
-        """Finish the bag; a second call does nothing.
-
-        Raises:
-            OSError: the storage refuses; the journals stay, and can be read.
-        """
+        """Finish the bag; a second call does nothing. If the storage refuses the journals stay."""
         if self._closed:
             return
         self.put_back()

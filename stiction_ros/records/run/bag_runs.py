@@ -82,11 +82,9 @@ class Told:
 
 
 def tell_runs(stamps: Sequence[int], numbers: Sequence[int]) -> Told:
-    """Tell the runs apart.
+    """Tell apart the runs of one signal by its ``stamps``, ns, in the order of the log.
 
-    Args:
-        stamps: of one signal in the order of the log, ns.
-        numbers: of these messages in the log, increasing.
+    The ``numbers`` of these messages in the log increase.
     """
     pieces = _connected(_chains(stamps, numbers))
     if not pieces:
@@ -107,15 +105,10 @@ def tell_runs(stamps: Sequence[int], numbers: Sequence[int]) -> Told:
 
 
 def run_of(runs: Sequence[Run], stamp: int, number: int) -> Run:
-    """Return the run to which a message of another signal belongs.
+    """Return which of ``runs``, one at least, a message of another signal belongs to.
 
-    It is the one that has its stamp nearest in the log, unless that is far away, as when the
-    sample itself was lost: then it is the run that had begun last.
-
-    Args:
-        runs: one at least.
-        stamp: of the message, ns.
-        number: its place in the log.
+    It is the one that has its stamp, in ns, nearest to its number in the log, unless that is far
+    away, as when the sample itself was lost: then it is the run that had begun last.
     """
     active = next((run for run in reversed(runs) if run.begin <= number), runs[0])
     known = [run for run in runs if stamp in run.place]
@@ -153,10 +146,7 @@ def _chains(stamps: Sequence[int], numbers: Sequence[int]) -> list[Run]:
 
 
 def _usual_step(stamps: Sequence[int]) -> float:
-    """Return the usual step from one message of a run to the next, ns.
-
-    Where two runs alternate the next message is the next but one.
-    """
+    """Return the usual step from one message of a run to the next, ns."""
     found = []
     for lag in (1, 2):
         given = np.asarray(stamps, dtype=np.int64)
@@ -168,10 +158,7 @@ def _usual_step(stamps: Sequence[int]) -> float:
 
 
 def _connected(chains: Sequence[Run]) -> list[Run]:
-    """Join chains of which one begins where another has ended, in stamps and in the log.
-
-    A run does not go on when another one has begun after its end.
-    """
+    """Join chains of which one begins where another has ended, in stamps and in the log."""
     runs: list[Run] = []
     for chain in chains:
         newest = max((run.begin for run in runs if len(run.place) >= NEW_RUN), default=0)

@@ -112,8 +112,7 @@ class _Status(NamedTuple):
 def of_loop(messages: Iterable[BagMessage], space: str) -> list[BagMessage]:
     """Return the messages of the loop in the namespace ``space``, and what is global.
 
-    The diagnostics of all loops share a topic; of these the statuses of the loop's nodes
-    are kept, which begin with its namespace.
+    Of the diagnostics, a topic that loops share, the statuses of the loop's own nodes are kept.
     """
     kept = []
     for message in messages:
@@ -180,10 +179,7 @@ def gap_log(messages: Iterable[BagMessage]) -> GapLog:
 
 
 def answer_times(messages: Iterable[BagMessage]) -> dict[str, float]:
-    """Return p50, p99, p999 and max of the times from PV to OP, ms; empty in lockstep.
-
-    The figures are of the whole run, so the last ones told count.
-    """
+    """Return the last p50, p99, p999 and max of the times from PV to OP, ms; empty in lockstep."""
     found: dict[str, float] = {}
     for _, _, told in _statuses(messages):
         values = {name: _number(told.get(f"pv_to_op_ms_{name}", "")) for name in FIGURES}
@@ -195,10 +191,8 @@ def answer_times(messages: Iterable[BagMessage]) -> dict[str, float]:
 def stem_estimate(messages: Iterable[BagMessage], record: Record, start: int) -> FloatArray | None:
     """Return the stem positions, shape (N, m), in the first points on ``prediction``.
 
-    Args:
-        messages: of the run.
-        record: without gaps; NaN stands where a sample has no prediction.
-        start: stamp of its first sample, ns.
+    The ``record`` has no gaps and begins at stamp ``start``, ns; NaN stands where a sample has no
+    prediction.
     """
     found = np.full((len(record), len(record.valves)), np.nan)
     told = False
@@ -219,10 +213,7 @@ def _force(change: ModeChange) -> tuple[object, ...]:
 
 
 def _frictions(values: Mapping[str, str], mark: str) -> dict[str, float]:
-    """Return ``V1.f_s`` → value from keys such as ``V1.f_s`` or ``V1.trusted_f_s``.
-
-    What a law has for further parameters is among them; its name is no number and is not.
-    """
+    """Return ``V1.f_s`` → value from keys such as ``V1.f_s`` or ``V1.trusted_f_s``."""
     found = {}
     for key, value in values.items():
         valve, dot, name = key.rpartition(mark)

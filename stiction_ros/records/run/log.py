@@ -183,10 +183,7 @@ def _said(
 
 
 def _record(run: LoopRun, runs: Sequence[LoopRun]) -> Record:
-    """Return the record of a run on one regular grid, its notes telling of gaps and other runs.
-
-    Only the longest stretch is taken of a run with a gap that is longer than all its samples.
-    """
+    """Return the record of a run on one regular grid, its notes telling of gaps and other runs."""
     total = sum(len(part) for part in run.parts)
     stretches: list[list[Record]] = [[run.parts[0]]]
     for before, after in itertools.pairwise(run.parts):

@@ -151,10 +151,7 @@ def bag_information(
 ) -> dict[str, Any]:
     """Return the mapping ``rosbag2_bagfile_information`` of a bag.
 
-    Args:
-        files: its storage files in order, one at least.
-        topics: each once.
-        custom: short texts about the run, such as its seed.
+    Its ``files`` are in order, one at least; ``custom`` are short texts about the run.
     """
     whole = joined(files)
     return {

@@ -61,11 +61,7 @@ class RawMessage(NamedTuple):
 
 
 class McapScan:
-    """One pass over an MCAP file.
-
-    Args:
-        path: the file.
-        salvage: pass over records that are damaged, with a note, instead of raising.
+    """One pass over an MCAP file; to ``salvage`` is to pass over damaged records with a note.
 
     Attributes:
         topics: channel id to topic, filled as :meth:`messages` goes on.
@@ -89,11 +85,10 @@ class McapScan:
         self._schemas: dict[int, Schema] = {}
 
     def messages(self) -> Iterator[RawMessage]:
-        """Yield every complete message in the order of the file.
+        """Yield every complete message in the order of the file, those before a damage first.
 
         Raises:
-            InputError: no such file, not an MCAP file, or damaged inside; what is before the
-                damage comes first.
+            InputError: no such file, not an MCAP file, or damaged inside.
         """
         try:
             with opened(self.path) as file:
@@ -245,14 +240,7 @@ def _is_closed(tail: bytes) -> bool:
 
 
 def _summary(rest: bytes) -> list[McapRecord]:
-    """Return the records of a summary, its checksum compared.
-
-    Args:
-        rest: everything behind the end of the data, to the end of the file.
-
-    Raises:
-        ValueError: no footer or a wrong checksum; and what damaged records raise.
-    """
+    """Return the records of a summary, its checksum compared."""
     if not _is_closed(rest[-FOOTER_SIZE:]):
         raise ValueError("no footer at its end")
     protected, (checksum,) = rest[: -len(MAGIC) - 4], struct.unpack_from("<I", rest, len(rest) - 12)

@@ -36,7 +36,6 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
     Raises:
         InputError: packed, and cut off or damaged.
-        OSError: it cannot be read, or the storage refuses.
     """
     with path.open("rb") as file:
         packed = file.read(len(ZSTD)) == ZSTD
@@ -58,12 +57,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def unpacked(source: BinaryIO) -> Iterator[bytes]:
-    """Yield what one frame of Zstandard or several hold, a block at a time.
-
-    Raises:
-        EOFError: the last frame is cut off.
-        zstandard.ZstdError: it is damaged.
-    """
+    """Yield what frames of Zstandard hold, a block at a time; EOFError if the last is cut off."""
     frame = zstandard.ZstdDecompressor().decompressobj()
     while block := source.read(zstandard.DECOMPRESSION_RECOMMENDED_INPUT_SIZE):
         while block:

@@ -43,12 +43,7 @@ def has_friction(valve: Mapping[str, Any]) -> bool:
 
 
 def valve_cards(valves: Sequence[Mapping[str, Any]], story: Story | None = None) -> str:
-    """Return one box a valve: verdict, friction with intervals, and the truth where known.
-
-    Args:
-        valves: entries of ``identify --json``.
-        story: of the run, where there is one.
-    """
+    """Return one box a valve: verdict, friction with intervals, and the truth where known."""
     boxes = []
     for valve in valves:
         more = (

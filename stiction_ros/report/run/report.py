@@ -16,14 +16,7 @@ from stiction_ros.report.run.summary import summary, write_json
 
 @dataclasses.dataclass(frozen=True)
 class RunReport:
-    """What was written.
-
-    Attributes:
-        story: the run and its scores.
-        summary: the mapping in ``summary.json``.
-        page: ``report.html``.
-        files: everything that was written.
-    """
+    """What was written: the story of the run, ``summary.json``, the page, and all files."""
 
     story: Story
     summary: dict[str, Any]

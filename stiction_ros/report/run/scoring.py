@@ -106,10 +106,7 @@ class Phases:
 
 
 def round_length(sp: FloatArray) -> int | None:
-    """Return the samples after which the moves of ``sp``, shape (N, p), repeat exactly.
-
-    None when they do not repeat, or when nothing moves.
-    """
+    """Return the samples after which moves of ``sp``, (N, p), repeat exactly; None if never."""
     moves = [first for first, _ in holds(sp)[1:]]
     for length in moves:
         if 2 * length <= len(sp) and np.array_equal(sp[length:], sp[:-length]):
@@ -182,12 +179,6 @@ def phases(
 
     Rounds are counted from the first sample. Without a repeating schedule everything before
     the swap is set against everything after it, which the caller should say.
-
-    Args:
-        record: of the whole run.
-        swap: first sample of the new controller; None when there was none.
-        round_samples: length of one round of the set-point schedule.
-        noise_std: σ of the measurement noise of each output where known.
     """
     sigma = [0.0] * len(record.outputs) if noise_std is None else list(noise_std)
     if swap is None or not 0 < swap < len(record):

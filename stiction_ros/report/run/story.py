@@ -68,10 +68,7 @@ class Story:
         return self.log.fits[-1].identification if self.log.fits else {}
 
     def true_friction(self, valve: str) -> tuple[float, float] | None:
-        """Return f_S and f_D in the simulated plant, (0, 0) for a valve without friction.
-
-        None where they are not known: of a real plant, and of a law that has no such figures.
-        """
+        """Return f_S and f_D of the simulated plant, (0, 0) for an ideal valve, None if unknown."""
         if self.truth is None:
             return None
         for entry in self.truth.valves:

@@ -1,7 +1,6 @@
 """Workers of a Dask cluster that someone runs: here loops are only handed in and taken out.
 
-The scheduler gives a loop whose worker was lost to another one by itself. It runs whatever it is
-sent, so it belongs into a closed network; with TLS in Dask's own settings it is reached by that.
+It runs whatever it is sent, so it belongs into a closed network, or behind TLS in Dask's settings.
 """
 
 from __future__ import annotations
@@ -28,11 +27,7 @@ class DaskEngine:
     """A scheduler and its workers."""
 
     def __init__(self, address: str) -> None:
-        """Connect to ``dask://HOST:PORT``.
-
-        Raises:
-            InputError: Dask is not installed, nobody answers, or there is no worker.
-        """
+        """Connect to ``dask://HOST:PORT``; refused without Dask, an answer or a worker."""
         try:
             import dask
             import distributed

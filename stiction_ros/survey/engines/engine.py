@@ -52,13 +52,7 @@ class Engine(Protocol):
 
 
 def lost(task: Task, reason: str, *, again: bool = False) -> Done:
-    """Return a loop that could not be judged.
-
-    Args:
-        task: that was lost.
-        reason: one sentence without a full stop.
-        again: whether that says nothing of the loop, as its worker died.
-    """
+    """Return a loop that could not be judged, for a reason that may pass when tried ``again``."""
     loop = task.loop
     entry = Entry(
         loop.name,

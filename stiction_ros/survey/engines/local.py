@@ -1,11 +1,7 @@
 """Worker processes of this machine: the engine that needs nothing else.
 
-Workers are forked from one process that has imported what they need. One that is killed is replaced
-and its loop tried once more. One loop is with each worker at a time and one more is drawn when it
-comes back, so memory does not grow with the plant. One worker is started first and the others when
-it is ready, so that where none can start this is said once. A worker first loads or compiles its
-machine code and says that it is ready; only then is it sent its loop, and the loop's time begins:
-what a busy machine takes to start is no loop's fault.
+Workers are forked from one process that has imported what they need, the first of them alone. One
+that is killed is replaced and its loop tried once more. A worker gets its loop when it is ready.
 """
 
 from __future__ import annotations
@@ -64,12 +60,7 @@ class LocalEngine:
     name = "local"
 
     def __init__(self, jobs: int, longest: float = LONGEST) -> None:
-        """Start no process yet.
-
-        Args:
-            jobs: processes, one at least.
-            longest: seconds that a loop may take, from when a worker that is ready has it.
-        """
+        """Start no process yet; a worker that is ready may take ``longest`` seconds for a loop."""
         self._jobs, self._longest = max(jobs, 1), longest
         self._workers: list[_Worker] = []
         self._proven = False
@@ -85,11 +76,7 @@ class LocalEngine:
         return tuple(worker.process.pid or 0 for worker in self._workers)
 
     def run(self, tasks: Iterable[Task], options: SurveyOptions) -> Iterator[Done]:
-        """Yield what is said of each loop as it comes.
-
-        Raises:
-            InputError: the first worker ends before it is ready, as no other would get further.
-        """
+        """Yield what is said of each loop as it comes; refused if no worker gets ready."""
         waiting = iter(tasks)
         exhausted = False
         try:

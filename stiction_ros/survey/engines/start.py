@@ -1,7 +1,6 @@
 """How worker processes of this machine are started: they import what the one that starts them does.
 
-A new interpreter looks for modules in the folder that one stands in first, and a folder there may
-bear the name of this package, as that of a clone does. It would be taken for the package.
+A new interpreter would look in the present folder first, where a clone may bear this name.
 """
 
 from __future__ import annotations
@@ -19,11 +18,7 @@ from stiction_ros.orphans import spared
 
 
 def context_of(module: str) -> ForkServerContext | SpawnContext:
-    """Return how processes are started here; there is no fork server on every system.
-
-    Args:
-        module: that the server imports once for all of its workers.
-    """
+    """Return how processes are started here; a server, if there is one, imports ``module`` once."""
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
@@ -34,13 +29,7 @@ def context_of(module: str) -> ForkServerContext | SpawnContext:
 def started(
     context: ForkServerContext | SpawnContext, work: Callable[..., None], *arguments: Any
 ) -> BaseProcess:
-    """Return a process that does ``work`` and ends with this one.
-
-    Args:
-        context: see :func:`context_of`.
-        work: a function of a module.
-        arguments: of it.
-    """
+    """Return a process of a :func:`context_of` that does ``work`` and ends with this one."""
     process = context.Process(target=work, args=arguments, daemon=True)
     with same_imports(), spared():
         process.start()

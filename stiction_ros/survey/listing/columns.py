@@ -83,12 +83,7 @@ class Columns:
 
     @classmethod
     def of(cls, entries: Sequence[Entry], earlier: Sequence[Earlier]) -> Columns:
-        """Return the columns of a list.
-
-        Args:
-            entries: its rows.
-            earlier: surveys before it, the oldest first.
-        """
+        """Return the columns of a list with earlier surveys, the oldest first."""
         found = {entry.name: trend_of(entry, earlier) for entry in entries}
         trends = {name: trend for name, trend in found.items() if trend is not None}
         units = {entry.op_unit for entry in entries}

@@ -50,12 +50,7 @@ heads.forEach((head, column) => head.querySelector("button").addEventListener("c
 
 
 def list_page(survey: Survey, earlier: Sequence[Earlier] = ()) -> str:
-    """Return the page.
-
-    Args:
-        survey: what was found.
-        earlier: surveys before it, the oldest first.
-    """
+    """Return the page of a survey, with those before it, the oldest first."""
     entries = survey.entries
     first = headline(survey)
     columns = Columns.of(entries, earlier)
