@@ -30,8 +30,7 @@ from stiction_ros.intake.sheets.cells import Numbers
 from stiction_ros.intake.sheets.layout import delimiter_of
 from stiction_ros.intake.sheets.text import open_text
 
-LOCAL = "local"
-"""The engine of this machine."""
+LOCAL = "local"  # the engine of this machine
 
 PAGE, CSV, XLSX = "survey.html", "survey.csv", "survey.xlsx"
 

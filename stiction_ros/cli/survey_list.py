@@ -16,14 +16,12 @@ if TYPE_CHECKING:
     from stiction_ros.survey.pages.trend import Earlier
     from stiction_ros.survey.survey import Survey
 
-SHOWN = 30
-"""Rows of the list that are printed."""
+SHOWN = 30  # rows of the list that are printed
 
 ALWAYS, CAUSE = 3, 6
 """Columns that stand in the narrowest window, and the first one that is broken between words."""
 
-APART = 2
-"""Blanks between two columns."""
+APART = 2  # blanks between two columns
 
 
 def print_list(found: Survey, earlier: Sequence[Earlier]) -> None:

@@ -14,15 +14,13 @@ from stiction_ros.cli.shared.progress import bar
 if TYPE_CHECKING:
     from stiction_ros.survey.survey import Reached
 
-Clock = Callable[[], float]
-"""Seconds since any time."""
+Clock = Callable[[], float]  # seconds since any time
 
 SHARE, SECONDS = 0.1, 30.0
 """A line is printed after this share of the loops or this time, whichever comes first, where nobody
 looks at a terminal."""
 
-ENDS_WITHIN = 5.0
-"""Seconds that counting is given to end."""
+ENDS_WITHIN = 5.0  # seconds that counting is given to end
 
 
 class Counted:

@@ -26,8 +26,7 @@ from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 from stiction_ros.texts import plural
 
-EMPTY = frozenset(("None", "nan", "NaN", "NaT", "<NA>"))
-"""What missing values are as texts."""
+EMPTY = frozenset(("None", "nan", "NaN", "NaT", "<NA>"))  # what missing values are as texts
 
 _WORDS: Mapping[str, type[enum.StrEnum]] = {
     "op_unit": OpUnit,

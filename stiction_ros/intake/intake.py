@@ -23,11 +23,8 @@ from stiction_ros.records.record import Record
 from stiction_ros.records.run.bag_reader import read_bag_loops, read_bag_parts
 from stiction_ros.records.storage.files import listed_names, split_number
 
-BARE = (".mcap", ".db3")
-"""Ends of the names of files that are bags by themselves."""
-
-OTHERS = 8
-"""Names that an error or a remark lists."""
+BARE = (".mcap", ".db3")  # ends of the names of files that are bags by themselves
+OTHERS = 8  # names that an error or a remark lists
 
 
 def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:

@@ -22,11 +22,8 @@ from stiction_ros.texts import plural
 AUTOMATIC, MANUAL = pattern_of("automatic"), pattern_of("manual")
 """Words of modes; in tracking and initialisation OP follows something else than the controller."""
 
-STILL = 0.02
-"""Share of samples at which OP moves at most in manual, to tell modes that are numbers."""
-
-BUSY = 0.2
-"""Share of samples at which OP moves at least in automatic, for the same."""
+STILL = 0.02  # share of samples at which OP moves at most in manual, to tell modes that are numbers
+BUSY = 0.2  # share of samples at which OP moves at least in automatic, for the same
 
 
 def manual_marked(block: Block, rules: Rules, automatic: tuple[str, ...] | None) -> Block:

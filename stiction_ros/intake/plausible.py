@@ -17,20 +17,11 @@ from stiction_ros.intake.tables.block import Block, Column
 from stiction_ros.intake.words import WORDS
 from stiction_ros.signals.velocity_form import explained
 
-PERCENT = (-10.0, 110.0)
-"""What an OP in % stays within."""
-
-OFTEN = 0.1
-"""Share of the samples outside of that from which it is told."""
-
-CURRENT = (3.8, 20.5)
-"""What an OP in mA stays within."""
-
-FOLLOWS = 0.9
-"""Share of the moves of a controller's output that its law explains, at least."""
-
-LEADS = 8.0
-"""How many times more the law leaves unexplained the other way round, at least."""
+PERCENT = (-10.0, 110.0)  # what an OP in % stays within
+OFTEN = 0.1  # share of the samples outside of that from which it is told
+CURRENT = (3.8, 20.5)  # what an OP in mA stays within
+FOLLOWS = 0.9  # share of the moves of a controller's output that its law explains, at least
+LEADS = 8.0  # how many times more the law leaves unexplained the other way round, at least
 
 STRIDES = (1, 2, 4, 8)
 """Samples over which moves are looked at; one of them is enough.
@@ -43,17 +34,10 @@ that are.
 SAID = {unit: WORDS["op_ranges"][unit][2] for unit in TO_PERCENT}
 """Units of an OP as notes name them."""
 
-SEVERAL = frozenset(WORDS["several"])
-"""Units of OP of which several ranges are usual."""
-
-OWN = "its own unit"
-"""What stands for the unit of an OP that is not known to be in %."""
-
-EXAMINED = 20_000
-"""Samples that are looked at."""
-
-FEWEST = 50
-"""Samples from which anything is told of a swap."""
+SEVERAL = frozenset(WORDS["several"])  # units of OP of which several ranges are usual
+OWN = "its own unit"  # what stands for the unit of an OP that is not known to be in %
+EXAMINED = 20_000  # samples that are looked at
+FEWEST = 50  # samples from which anything is told of a swap
 
 CLOSER, OFFSET, TRACKED = 0.1, 0.3, 0.7
 """How much nearer to the set-point than the other the measurement is, as a share; its lasting

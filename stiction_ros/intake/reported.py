@@ -22,14 +22,9 @@ from stiction_ros.texts import plural
 COVERED = 0.75
 """Share of all stamps that OP and PV each have, from which they were sampled together."""
 
-ON_GRID = 0.9
-"""Share of the steps that are multiples of the smallest, from which there is a scan."""
-
-DENSEST = 10.0
-"""Samples for one report of the signal that is reported most, at most."""
-
-QUIET = 60
-"""Samples that a signal may stay without a report before it counts as a gap."""
+ON_GRID = 0.9  # share of the steps that are multiples of the smallest, from which there is a scan
+DENSEST = 10.0  # samples for one report of the signal that is reported most, at most
+QUIET = 60  # samples that a signal may stay without a report before it counts as a gap
 
 
 def is_reported(block: Block) -> bool:

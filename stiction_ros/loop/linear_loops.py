@@ -18,11 +18,8 @@ from stiction_ros.signals.recovered_controller import RecoveredController
 Pairs = Sequence[tuple[int, RecoveredController]]
 """Per valve the output of its controller, −1 for none, and the controller."""
 
-BEYOND = 1e6
-"""Times the size of a start from which on a run is taken as gone."""
-
-LANES = 8
-"""Runs that go side by side: as many as a vector of the processor or two hold."""
+BEYOND = 1e6  # times the size of a start from which on a run is taken as gone
+LANES = 8  # runs that go side by side: as many as a vector of the processor or two hold
 
 
 class Process(NamedTuple):

@@ -19,8 +19,7 @@ from stiction_ros.effects.behaviour import Behaviour, FloatArray, IntArray
 from stiction_ros.loop.linear_loops import Controllers, command
 from stiction_ros.signals.controller_recovery import smoothed
 
-BEYOND = 1e4
-"""Times the size of the record from which on a run is taken as gone."""
+BEYOND = 1e4  # times the size of the record from which on a run is taken as gone
 
 Control = Callable[[int, FloatArray, FloatArray], None]
 """Sets OP of sample k, shape (R, N, m), by PV, shape (R, N, p), up to it."""

@@ -11,8 +11,7 @@ from stiction_ros.records.record import Record
 
 CYCLES = 4
 
-UNCYCLED = 240
-"""Samples of the window where there is no cycle."""
+UNCYCLED = 240  # samples of the window where there is no cycle
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,11 +9,8 @@ DEFAULT_OUTPUT = "PV1"
 SIGNALS = {"op": "OP", "pv": "PV", "sp": "SP", "stem": "STEM"}
 """Signal of a record to the last part of its columns' names, in the order of the file."""
 
-QUALITY = "QUALITY"
-"""Column with the quality of each sample, written where not all are good."""
-
-MODE = "MODE"
-"""Column with the mode of the loop's controller, before that of the quality."""
+QUALITY = "QUALITY"  # column with the quality of each sample, written where not all are good
+MODE = "MODE"  # column with the mode of the loop's controller, before that of the quality
 
 _KEYS = {name: key for key, name in SIGNALS.items()}
 

@@ -12,11 +12,8 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Gap, Record
 
-DATES = 3e8
-"""Seconds from which a time is shown as a date: 1979."""
-
-ALIKE = 0.01
-"""Sample times of two parts, one over the other, that count as the same."""
+DATES = 3e8  # seconds from which a time is shown as a date: 1979
+ALIKE = 0.01  # sample times of two parts, one over the other, that count as the same
 
 
 def only_part(parts: Sequence[Record], where: str) -> Record:

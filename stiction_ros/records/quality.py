@@ -27,8 +27,5 @@ class Quality(enum.IntEnum):
         return self.name.lower()
 
 
-QUALITY_WORDS = {quality.word: quality for quality in Quality}
-"""Word in files to quality."""
-
-USABLE = (Quality.GOOD, Quality.HELD)
-"""What identification works on."""
+QUALITY_WORDS = {quality.word: quality for quality in Quality}  # word in files to quality
+USABLE = (Quality.GOOD, Quality.HELD)  # what identification works on

@@ -17,31 +17,25 @@ from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.records.quality import Quality, QualityArray
 from stiction_ros.records.sampling import TOLERATED, shortest
 
-GAP = 5.5
-"""A step of more usual steps than this is a gap: the record is split there."""
+GAP = 5.5  # a step of more usual steps than this is a gap: the record is split there
 
 SLIGHT = 0.1
 """Share of the places that may be without a row, and the mean square by which steps may stray
 from their mean, over that mean: rows missing at random make the one as large as the other."""
 
-HOLE = 1.5
-"""A step of more usual steps than this is a hole in which samples are missing."""
+HOLE = 1.5  # a step of more usual steps than this is a hole in which samples are missing
 
 CAUGHT_UP = 0.25
 """Steps by which rows may still be late when the delay of one of them is over: half of what a
 row may be off its place."""
 
-SHORTEST = 3
-"""Samples that a repair needs at least."""
-
-FEWEST_STAMPS = 5
-"""Stamps from which on it can be told that they are cut off."""
+SHORTEST = 3  # samples that a repair needs at least
+FEWEST_STAMPS = 5  # stamps from which on it can be told that they are cut off
 
 DIFFERENT = 0.5
 """Share of rows with a stamp that was there already in which OP or PV must differ, for the same."""
 
-BY_CHANCE = 1e-3
-"""Chance with which rows lost at random may pass for stamps with too few digits."""
+BY_CHANCE = 1e-3  # chance with which rows lost at random may pass for stamps with too few digits
 
 WHOLE = 1e-3
 """Share of the smallest step by which others are off its multiples in rounded stamps, at most."""

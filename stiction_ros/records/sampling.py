@@ -9,11 +9,8 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 
-SILENT = 1e-4
-"""Jitter, as a share of the sample time, that is rounding and not worth a word."""
-
-TOLERATED = 0.1
-"""Jitter, as a share of the sample time, that is taken as regular with a note."""
+SILENT = 1e-4  # jitter, as a share of the sample time, that is rounding and not worth a word
+TOLERATED = 0.1  # jitter, as a share of the sample time, that is taken as regular with a note
 
 
 def sample_time(

@@ -11,8 +11,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 
-STANDS = 1e-9
-"""Share of the stem's range up to which a move is rounding."""
+STANDS = 1e-9  # share of the stem's range up to which a move is rounding
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,8 +9,7 @@ from pathlib import Path
 from stiction_ros.pages import frame
 from stiction_ros.pages.frame import SCROLLED, text, words
 
-Cell = str | tuple[str, str]
-"""Text of a table cell, or its class and its text."""
+Cell = str | tuple[str, str]  # text of a table cell, or its class and its text
 
 
 def page_file(out: str | Path) -> tuple[Path, Path | None]:

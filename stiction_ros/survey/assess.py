@@ -29,11 +29,8 @@ from stiction_ros.survey.pages.loop_page import loop_page
 from stiction_ros.survey.pages.words import cause_words
 from stiction_ros.survey.survey_options import SurveyOptions
 
-FEWEST = 100
-"""Samples in automatic below which nothing is judged."""
-
-NEAR_LIMIT = 1e-6
-"""Share of OP's range within which it stands at an end of it."""
+FEWEST = 100  # samples in automatic below which nothing is judged
+NEAR_LIMIT = 1e-6  # share of OP's range within which it stands at an end of it
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,14 +8,12 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.signals.movement import moving, size
 from stiction_ros.signals.oscillation import turnings
 
-MOST = 200
-"""Beats that are kept of a record, the last ones."""
+MOST = 200  # beats that are kept of a record, the last ones
 
 FEWEST = 5
 """Beats of one loop, while the other one was recorded too, from which two can be compared."""
 
-ALIKE = 0.05
-"""Logarithm of the ratio of two periods up to which they may be the same."""
+ALIKE = 0.05  # logarithm of the ratio of two periods up to which they may be the same
 
 LOCKED = 0.85
 """Mean resultant length of the phases from which on two loops keep the same time: 1 is to the

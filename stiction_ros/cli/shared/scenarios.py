@@ -11,8 +11,7 @@ import yaml
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 
-SCENARIOS = ("tank", "siso")
-"""Those that are run where none is named."""
+SCENARIOS = ("tank", "siso")  # those that are run where none is named
 ALL = (*SCENARIOS, "siso_test", "tank_test")
 STARTED = ("recorder", "estimator", "controller", "plant")
 """The nodes of a loop, in the order in which they are started."""

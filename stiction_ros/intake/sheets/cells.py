@@ -21,8 +21,7 @@ Cells = Sequence[str] | NDArray[np.float64] | NDArray[np.datetime64]
 BAD_WORDS = pattern_of("bad_words")
 """What historians write in the place of a number; anything else that is no number counts too."""
 
-SHOWN = 30
-"""Characters of a cell that an error shows."""
+SHOWN = 30  # characters of a cell that an error shows
 
 _SIGNS = str.maketrans({"\u2212": "-", "\u00a0": "", "\u202f": "", "\u2009": "", "'": ""})
 """Signs in numbers that are typeset: a minus, and spaces and marks between thousands."""

@@ -16,14 +16,9 @@ from stiction_ros.intake.words import pattern_of
 DELIMITERS = ("\t", ";", "|", ",")
 """In the order in which they are tried: commas and bars may stand inside cells."""
 
-SPACE = " "
-"""What stands for white space of any length."""
-
-WHOLE = 0.6
-"""Share of the usual number of cells that a row of data has at least."""
-
-LOOKED_AT = 40
-"""Lines at the top of a file that are looked at."""
+SPACE = " "  # what stands for white space of any length
+WHOLE = 0.6  # share of the usual number of cells that a row of data has at least
+LOOKED_AT = 40  # lines at the top of a file that are looked at
 
 UNITS = pattern_of("units_row")
 _BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")

@@ -27,8 +27,7 @@ from stiction_ros.intake.sheets.layout import (
 from stiction_ros.intake.sheets.names import OR_ROW, folded
 from stiction_ros.intake.sheets.stamps import is_stamp
 
-PIECE = 200_000
-"""Cells that are held as text at one time."""
+PIECE = 200_000  # cells that are held as text at one time
 
 _POINT, _COMMA = re.compile(r"[+-]?\d+\.\d+"), re.compile(r"[+-]?\d+,\d+")
 

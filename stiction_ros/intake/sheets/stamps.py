@@ -21,8 +21,7 @@ from stiction_ros.intake.sheets.cells import SHOWN, Cells, Numbers, Wrong, is_nu
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.words import by_word
 
-DAY = 86_400_000_000
-"""Microseconds of a day."""
+DAY = 86_400_000_000  # microseconds of a day
 
 
 class _No(enum.IntEnum):

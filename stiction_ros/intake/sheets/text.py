@@ -33,11 +33,8 @@ REFUSED = (
 )
 """First bytes of files that are no text, what these are, and what helps."""
 
-HEAD = 4096
-"""Bytes by which the encoding is told."""
-
-SHORTEST = 16
-"""Bytes from which UTF-16 without its mark is told."""
+HEAD = 4096  # bytes by which the encoding is told
+SHORTEST = 16  # bytes from which UTF-16 without its mark is told
 
 NULLS = 0.7
 """Share of zero bytes on one side of the pairs from which text is UTF-16 without its mark."""

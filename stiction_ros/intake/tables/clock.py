@@ -17,8 +17,7 @@ from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.stamps import Clock, Times, is_stamp
 from stiction_ros.records.parts import DATES
 
-DATED = (DATES, 4e9)
-"""Seconds since 1970 that are taken for dates: 1979 to 2096."""
+DATED = (DATES, 4e9)  # seconds since 1970 that are taken for dates: 1979 to 2096
 
 SPREADSHEET = (25569.0, 73050.0)
 """Days since the last of 1899 in which spreadsheets count 1970 to 2099."""
@@ -49,8 +48,7 @@ class TimeColumn(NamedTuple):
         return [f"{_MIDNIGHT.sub('', str(date))} {clock}".strip() for date, clock in pairs]
 
 
-ROWS_APART = TimeColumn(-1)
-"""That of a table whose rows are a sample time apart, without times."""
+ROWS_APART = TimeColumn(-1)  # that of a table whose rows are a sample time apart, without times
 
 
 def time_column(sheet: Sheet, name: str | None) -> TimeColumn:

@@ -21,8 +21,7 @@ from stiction_ros.intake.tables.qualities import qualities_of, quality_places
 from stiction_ros.intake.tables.tags import TagList
 from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
 
-LOOKED_AT = 1000
-"""Rows by which it is told what stands in a column."""
+LOOKED_AT = 1000  # rows by which it is told what stands in a column
 
 
 class Shape(enum.Enum):

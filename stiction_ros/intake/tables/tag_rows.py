@@ -14,8 +14,7 @@ from stiction_ros.intake.sheets.stamps import DateOrder
 from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.intake.words import WORDS
 
-LONGEST = 1e9
-"""Sample time that is none any more, s."""
+LONGEST = 1e9  # sample time that is none any more, s
 
 
 @dataclasses.dataclass(frozen=True)

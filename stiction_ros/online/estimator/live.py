@@ -40,8 +40,7 @@ METHOD = "exact"
 
 LAWS = ("he", "kano", "choudhury", "xch", "semi_physical", AUTO)
 
-LAW_METHOD = "evidence"
-"""Search that tells a law which is left open."""
+LAW_METHOD = "evidence"  # search that tells a law which is left open
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,8 +15,7 @@ import yaml
 from stiction_ros.records.storage.files import storage_files
 from stiction_ros.records.storage.mcap_scan import McapScan
 
-RUN = "stiction_run"
-"""Name of the metadata records."""
+RUN = "stiction_run"  # name of the metadata records
 
 _LENGTH = struct.Struct("<I")
 _HEAD = 4  # bytes of the CDR encapsulation

@@ -15,23 +15,12 @@ import numpy as np
 
 from stiction_ros.records.regular import GAP
 
-NEW_RUN = 10
-"""Messages that make a run beside another; fewer are out of order."""
-
-LATE = 3
-"""Messages out of order that may have come late, and are put where they are missing."""
-
-AGAIN = 0.75
-"""How far off, in usual steps, a message counts that shows the present sample again."""
-
-STALE = 0.1
-"""How much further off a chain counts for each message that did not continue it."""
-
-FORGOTTEN = 25
-"""Messages after which a chain that none of them continued is over."""
-
-NEAR = 30
-"""Messages of all signals between a sample and another signal's message for it, at most."""
+NEW_RUN = 10  # messages that make a run beside another; fewer are out of order
+LATE = 3  # messages out of order that may have come late, and are put where they are missing
+AGAIN = 0.75  # how far off, in usual steps, a message counts that shows the present sample again
+STALE = 0.1  # how much further off a chain counts for each message that did not continue it
+FORGOTTEN = 25  # messages after which a chain that none of them continued is over
+NEAR = 30  # messages of all signals between a sample and another signal's message for it, at most
 
 
 @dataclasses.dataclass

@@ -16,9 +16,7 @@ from stiction_ros.records.run.bag_runs import run_of, tell_runs
 from stiction_ros.records.run.loop_signals import Given, LoopSignals
 from stiction_ros.records.whole import Source, Whole
 
-Samples = dict[int, dict[str, float]]
-"""Stamp in ns to tag to value."""
-
+Samples = dict[int, dict[str, float]]  # stamp in ns to tag to value
 MOST_HELD = 0.01  # share of the samples at which a missing stem is held
 
 

@@ -11,11 +11,8 @@ import yaml
 
 from stiction_ros.errors import InputError
 
-VERSION = 9
-"""Version of ``metadata.yaml``: QoS is a list of mappings with enums as words."""
-
-INFINITE_NS = 2**63 - 1
-"""Nanoseconds by which ROS writes an infinite duration."""
+VERSION = 9  # version of ``metadata.yaml``: QoS is a list of mappings with enums as words
+INFINITE_NS = 2**63 - 1  # nanoseconds by which ROS writes an infinite duration
 
 _WORDS = {
     "history": ("system_default", "keep_last", "keep_all", "unknown"),

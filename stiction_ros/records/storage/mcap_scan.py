@@ -37,12 +37,10 @@ from stiction_ros.records.storage.bag_metadata import BagTopic
 from stiction_ros.records.storage.packed import SQLITE, conversion, opened
 
 MAGIC = b"\x89MCAP0\r\n"
-RECORD = struct.Struct("<BQ")
-"""Opcode and length of the content, before every record."""
+RECORD = struct.Struct("<BQ")  # opcode and length of the content, before every record
 
 FOOTER_HEAD = RECORD.pack(Opcode.FOOTER, 20)
-FOOTER_SIZE = len(FOOTER_HEAD) + 20 + len(MAGIC)
-"""Bytes of the footer with the magic behind it."""
+FOOTER_SIZE = len(FOOTER_HEAD) + 20 + len(MAGIC)  # bytes of the footer with the magic behind it
 
 _DAMAGE: tuple[type[Exception], ...] = (
     *(ValueError, ArithmeticError, RuntimeError, EOFError, MemoryError, struct.error),

@@ -17,8 +17,7 @@ SUFFIXES = (".zstd", ".zst")
 """Ends of the names of files that are packed with Zstandard; rosbag2 writes the first."""
 
 SQLITE = b"SQLite format 3\0"
-ZSTD = b"\x28\xb5\x2f\xfd"
-"""First bytes of a file of either kind."""
+ZSTD = b"\x28\xb5\x2f\xfd"  # first bytes of a file of either kind
 
 
 def conversion(bag: Path) -> str:

@@ -16,11 +16,8 @@ from stiction_ros.survey.survey_options import SurveyOptions
 
 SCHEME = "dask://"
 
-AHEAD = 3
-"""Loops handed in for each thread of the cluster: one at work, others on their way."""
-
-PATIENCE = 15.0
-"""Seconds within which a scheduler must answer."""
+AHEAD = 3  # loops handed in for each thread of the cluster: one at work, others on their way
+PATIENCE = 15.0  # seconds within which a scheduler must answer
 
 
 class DaskEngine:

@@ -22,17 +22,10 @@ from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Task, lost
 from stiction_ros.survey.engines.start import context_of, started
 from stiction_ros.survey.survey_options import SurveyOptions
 
-LONGEST = 600.0
-"""Seconds that one loop may take; a usual one takes a second or two."""
-
-READY = "ready"
-"""What a worker says once, before its first loop."""
-
-SIGNAL = "signal"
-"""Begins how a worker ended that was killed: by chance, or as memory ran out."""
-
-ENDS_WITHIN = 2.0
-"""Seconds that a worker is given to end by itself."""
+LONGEST = 600.0  # seconds that one loop may take; a usual one takes a second or two
+READY = "ready"  # what a worker says once, before its first loop
+SIGNAL = "signal"  # begins how a worker ended that was killed: by chance, or as memory ran out
+ENDS_WITHIN = 2.0  # seconds that a worker is given to end by itself
 
 
 @dataclasses.dataclass

@@ -60,8 +60,7 @@ NONE = {
 }
 """Why a cell of a loop that was judged is empty; the other cells are so without friction."""
 
-Cell = tuple[str, object]
-"""HTML, and what it is sorted by; None stands last."""
+Cell = tuple[str, object]  # HTML, and what it is sorted by; None stands last
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,8 +9,7 @@ from stiction_ros.survey.pages.trend import Earlier, new_and_gone
 from stiction_ros.survey.pages.words import period
 from stiction_ros.survey.survey import Survey
 
-NAMED = 8
-"""Loops that a sentence lists."""
+NAMED = 8  # loops that a sentence lists
 
 
 def headline(survey: Survey) -> str:

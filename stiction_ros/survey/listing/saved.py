@@ -28,8 +28,7 @@ WHY = (
 )
 """What a note of ``gain`` says, and that in a word or two; the first that fits."""
 
-NOTHING = -0.005
-"""Change from which up another tuning is none that helps."""
+NOTHING = -0.005  # change from which up another tuning is none that helps
 
 
 def change(entry: Entry, what: str) -> float | None:

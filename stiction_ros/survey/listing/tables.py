@@ -43,8 +43,7 @@ HEAD = (
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 """What a text begins with that spreadsheets take for a formula."""
 
-STAMP = (1980, 1, 1, 0, 0, 0)
-"""Time of the files inside the XLSX: the same list is the same file."""
+STAMP = (1980, 1, 1, 0, 0, 0)  # time of the files inside the XLSX: the same list is the same file
 
 _TYPES = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">

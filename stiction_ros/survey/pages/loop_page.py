@@ -40,8 +40,7 @@ OPTIONS = {
 }
 
 LIST = "../survey.html"
-NO_UNIT = "PV units"
-"""What stands where no unit was given."""
+NO_UNIT = "PV units"  # what stands where no unit was given
 
 
 def loop_page(

@@ -15,8 +15,7 @@ CAUSES = {
 }
 """Cause of a cycle as people read it, wherever they do."""
 
-PERCENT = "%"
-"""Unit of an OP that is known; another one is the loop's own and has no name."""
+PERCENT = "%"  # unit of an OP that is known; another one is the loop's own and has no name
 
 
 def figure(value: float | None, digits: int = 3) -> str:
