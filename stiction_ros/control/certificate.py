@@ -32,21 +32,13 @@ class CertificateStatus(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Certificate:
-    """The mixed-integer optimum beside a plan.
+    """The mixed-integer optimum beside a plan."""
 
-    Attributes:
-        status: whether the optimum is known.
-        optimum: its cost, in the units of (19a), NaN when not known.
-        gap: cost of the plan above it as a share of it; not below 0; NaN when not known.
-        samples: of the horizon in which jumps were free.
-        nodes: of the search tree.
-    """
-
-    status: CertificateStatus
-    optimum: float
-    gap: float
-    samples: int
-    nodes: int
+    status: CertificateStatus  # whether the optimum is known
+    optimum: float  # its cost, in the units of (19a), NaN when not known
+    gap: float  # cost of the plan above it as a share of it; not below 0; NaN when not known
+    samples: int  # of the horizon in which jumps were free
+    nodes: int  # of the search tree
 
 
 def certify(problem: FreeJumps, state: FloatArray, target: Target, plan: Plan) -> Certificate:

@@ -61,24 +61,20 @@ def patterns(sticky: int) -> tuple[JumpPattern, ...]:
 
 @dataclasses.dataclass(frozen=True)
 class EmbeddingTuning:
-    """How sticky valves are moved.
+    """How sticky valves are moved."""
 
-    Attributes:
-        jump_price: cost added per jump, in the units of the criterion.
-        jump_margin: how far a jump exceeds the smallest one, as a share of f_S, where nothing
-            is known of the uncertainty of the frictions.
-        kick_limits: largest move of each OP in a sample, shape (m,), %, where a valve jumps; the
-            smallest jump is made all the same. Where the rate limit of OP is smaller it counts.
-        move_prices: cost of the smallest jump of each valve, shape (m,), in place of its weight
-            in S; larger jumps cost as their squares; 0 leaves the weight.
-        least_margin: least margin as a share of f_S where their intervals are known; the
-            margin is then the half-width of f_S's interval plus that of f_D's.
-    """
-
-    jump_price: float = 0.0
+    jump_price: float = 0.0  # cost added per jump, in the units of the criterion
+    # how far a jump exceeds the smallest one, as a share of f_S, where nothing is known of the
+    # uncertainty of the frictions
     jump_margin: float = 0.3
+    # least margin as a share of f_S where their intervals are known; the margin is then the
+    # half-width of f_S's interval plus that of f_D's
     least_margin: float = 0.1
+    # largest move of each OP in a sample, shape (m,), %, where a valve jumps; the smallest jump is
+    # made all the same. Where the rate limit of OP is smaller it counts
     kick_limits: FloatArray | None = None
+    # cost of the smallest jump of each valve, shape (m,), in place of its weight in S; larger jumps
+    # cost as their squares; 0 leaves the weight
     move_prices: FloatArray | None = None
 
 

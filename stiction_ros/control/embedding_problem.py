@@ -19,17 +19,11 @@ FREE = 1e30
 
 @dataclasses.dataclass(frozen=True)
 class JumpPattern:
-    """Moves of one sticky valve: none, one jump, or a second opposite one later.
+    """Moves of one sticky valve: none, one jump, or a second opposite one later."""
 
-    Attributes:
-        direction: sign of the first jump, 0 for staying.
-        second: samples from the first jump to the opposite one, 0 for none.
-        wait: samples before the first jump.
-    """
-
-    direction: int
-    second: int = 0
-    wait: int = 0
+    direction: int  # sign of the first jump, 0 for staying
+    second: int = 0  # samples from the first jump to the opposite one, 0 for none
+    wait: int = 0  # samples before the first jump
 
     @property
     def jumps(self) -> int:
@@ -39,19 +33,14 @@ class JumpPattern:
 
 @dataclasses.dataclass(frozen=True)
 class StickyState:
-    """What an embedding problem must know of the valves now; entries of healthy ones unused.
+    """What an embedding problem must know of the valves now; entries of healthy ones unused."""
 
-    Attributes:
-        last: stem estimates χ̂, shape (m,), %.
-        interval: lowest and highest stem position that is possible, shape (m, 2), %.
-        least, largest: jump with its margin, shape (m,), %; the least is always allowed.
-        room: distance that a jumping stem must keep from the limits for OP's sake, (m,), %.
-    """
-
-    last: FloatArray
-    interval: FloatArray
+    last: FloatArray  # stem estimates χ̂, shape (m,), %
+    interval: FloatArray  # lowest and highest stem position that is possible, shape (m, 2), %
+    # least, largest: jump with its margin, shape (m,), %; the least is always allowed
     least: FloatArray
     largest: FloatArray
+    # distance that a jumping stem must keep from the limits for OP's sake, (m,), %
     room: FloatArray
 
 

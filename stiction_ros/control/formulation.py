@@ -15,16 +15,12 @@ class Formulation(abc.ABC):
 
     In every sample :meth:`learn` comes first, then :meth:`reach` bounds the target, then
     :meth:`plan` is asked. One that has nothing to learn or to prepare has a plan only.
-
-    Attributes:
-        mode: what it does about the friction.
-        immobile: valves that it cannot move, by their numbers.
-        waits: whether stems at rest are to stay in this sample where that is feasible; who plans
-            no jumps takes no notice of it.
     """
 
-    mode: ControlMode
-    immobile: tuple[int, ...] = ()
+    mode: ControlMode  # what it does about the friction
+    immobile: tuple[int, ...] = ()  # valves that it cannot move, by their numbers
+    # whether stems at rest are to stay in this sample where that is feasible; who plans no jumps
+    # takes no notice of it
     waits: bool = False
 
     def learn(self, valves: ValveBeliefs, stem: FloatArray) -> None:  # noqa: B027

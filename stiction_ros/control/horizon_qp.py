@@ -17,34 +17,22 @@ OUT_OF_ITERATIONS = -4  # exit flag of daqp
 
 @dataclasses.dataclass(frozen=True)
 class HorizonSolution:
-    """A plan of one pattern of moves.
+    """A plan of one pattern of moves."""
 
-    Attributes:
-        plan: stems in deviations from the target, shape (N, m).
-        cost: of the plan.
-        slack: by how much outputs break their soft bounds at most, shape (p,).
-        variables: r.
-        pv: outputs at samples 1 … N, shape (N, p), where soft bounds have asked for them.
-    """
-
-    plan: FloatArray
-    cost: float
-    slack: FloatArray
-    variables: FloatArray
+    plan: FloatArray  # stems in deviations from the target, shape (N, m)
+    cost: float  # of the plan
+    slack: FloatArray  # by how much outputs break their soft bounds at most, shape (p,)
+    variables: FloatArray  # r
+    # outputs at samples 1 … N, shape (N, p), where soft bounds have asked for them
     pv: FloatArray | None = None
 
 
 @dataclasses.dataclass(frozen=True)
 class SharedTerms:
-    """Products that several programmes of one step share.
+    """Products that several programmes of one step share."""
 
-    Attributes:
-        gradient: of :meth:`HorizonCost.linear`, shape (N m,).
-        curved: Hessian times the offset, shape (N m,).
-    """
-
-    gradient: FloatArray
-    curved: FloatArray
+    gradient: FloatArray  # of ``HorizonCost.linear``, shape (N m,)
+    curved: FloatArray  # Hessian times the offset, shape (N m,)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -25,25 +25,17 @@ class ObserverKind(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class ObserverTuning:
-    """Covariances relative to the measurement noise, or the Luenberger gain.
+    """Covariances relative to the measurement noise, or the Luenberger gain."""
 
-    Attributes:
-        kind: Kalman filter, or the Luenberger observer with K_x = 0 and K_d = gain · I.
-        state_noise: variance of stem-like noise that enters through B, in %².
-        disturbance_noise: variance of the random walk of d, per output, in (units of PV)².
-        measurement_noise: variance of the measurement noise, per output, in (units of PV)².
-        gain: K_d of the Luenberger observer, 0 < gain ≤ 1; 1 is deadbeat and jitters.
-        gate: innovations beyond this many standard deviations are outliers; inf takes all.
-        gate_samples: successive outliers of one output after which they are taken for true.
-    """
-
-    kind: ObserverKind
-    state_noise: float
-    disturbance_noise: FloatArray
+    kind: ObserverKind  # Kalman filter, or the Luenberger observer with K_x = 0 and K_d = gain · I
+    state_noise: float  # variance of stem-like noise that enters through B, in %²
+    disturbance_noise: FloatArray  # variance of the random walk of d, per output, in (units of PV)²
+    # variance of the measurement noise, per output, in (units of PV)²
     measurement_noise: FloatArray
-    gain: float = 0.2
+    gain: float = 0.2  # K_d of the Luenberger observer, 0 < gain ≤ 1; 1 is deadbeat and jitters
+    # innovations beyond this many standard deviations are outliers; inf takes all
     gate: float = 20.0
-    gate_samples: int = 3
+    gate_samples: int = 3  # successive outliers of one output after which they are taken for true
 
 
 class Observer:

@@ -26,40 +26,25 @@ from stiction_ros.effects.behaviour import FloatArray
 
 @dataclasses.dataclass(frozen=True)
 class FallbackRule:
-    """How long a strategy may stand in.
+    """How long a strategy may stand in."""
 
-    Attributes:
-        hold_after: K, oldest age of a plan that is followed on, samples; then OP is held.
-        fallback_after: samples held until OP goes to ``fallback_op``; 0 holds for ever.
-        fallback_op: where it goes, shape (m,), %; None where it never does.
-        fallback_rate: largest move on the way there, shape (m,), % per sample.
-    """
-
-    hold_after: int = 5
-    fallback_after: int = 0
-    fallback_op: FloatArray | None = None
+    hold_after: int = 5  # K, oldest age of a plan that is followed on, samples; then OP is held
+    fallback_after: int = 0  # samples held until OP goes to ``fallback_op``; 0 holds for ever
+    fallback_op: FloatArray | None = None  # where it goes, shape (m,), %; None where it never does
+    # largest move on the way there, shape (m,), % per sample
     fallback_rate: FloatArray | None = None
 
 
 @dataclasses.dataclass(frozen=True)
 class Situation:
-    """What one step has to go by.
+    """What one step has to go by."""
 
-    Attributes:
-        state: ξ̂, shape (n,).
-        target: None when there is none, or when the inputs cannot be used.
-        last: stem estimates, shape (m,), %.
-        applied: the OP applied last, shape (m,), %.
-        forms: jump forms of the valves, None for those taken to be healthy.
-        trouble: why there is no target; empty when there is one.
-    """
-
-    state: FloatArray
-    target: Target | None
-    last: FloatArray
-    applied: FloatArray
-    forms: Sequence[JumpForm | None]
-    trouble: str
+    state: FloatArray  # ξ̂, shape (n,)
+    target: Target | None  # None when there is none, or when the inputs cannot be used
+    last: FloatArray  # stem estimates, shape (m,), %
+    applied: FloatArray  # the OP applied last, shape (m,), %
+    forms: Sequence[JumpForm | None]  # jump forms of the valves, None for those taken to be healthy
+    trouble: str  # why there is no target; empty when there is one
 
 
 @dataclasses.dataclass(frozen=True)

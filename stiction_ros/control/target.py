@@ -20,23 +20,15 @@ PROXIMAL = 1e-5
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """A steady state of the model.
+    """A steady state of the model."""
 
-    Attributes:
-        state: ξ_ss, shape (n,).
-        stem: χ_ss, shape (m,), %.
-        pv: the outputs there, shape (p,).
-        reachable: whether ``pv`` meets the set-points.
-        miss: SP − pv, shape (p,), zero when reachable.
-        path: with a preview of the set-points, the steady states of the samples 1 … N of the
-            horizon less ``state``, shape (N, n); None when they are all the same.
-    """
-
-    state: FloatArray
-    stem: FloatArray
-    pv: FloatArray
-    reachable: bool
-    miss: FloatArray
+    state: FloatArray  # ξ_ss, shape (n,)
+    stem: FloatArray  # χ_ss, shape (m,), %
+    pv: FloatArray  # the outputs there, shape (p,)
+    reachable: bool  # whether ``pv`` meets the set-points
+    miss: FloatArray  # SP − pv, shape (p,), zero when reachable
+    # with a preview of the set-points, the steady states of the samples 1 … N of the horizon less
+    # ``state``, shape (N, n); None when they are all the same
     path: FloatArray | None = None
 
 

@@ -35,22 +35,14 @@ def elapsed(before: float, now: float) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """One parameter of a behaviour, as YAML and reports name it.
+    """One parameter of a behaviour, as YAML and reports name it."""
 
-    Attributes:
-        key: name in YAML, such as ``f_s``.
-        attribute: name in Python, such as ``static_friction``.
-        unit: engineering unit, ``%`` of travel for valves.
-        low, high: closed range of accepted values.
-        description: one line for people.
-    """
-
-    key: str
-    attribute: str
-    unit: str
-    low: float
+    key: str  # name in YAML, such as ``f_s``
+    attribute: str  # name in Python, such as ``static_friction``
+    unit: str  # engineering unit, ``%`` of travel for valves
+    low: float  # low, high: closed range of accepted values
     high: float
-    description: str
+    description: str  # one line for people
 
 
 def parameter(
@@ -246,17 +238,12 @@ class Behaviour(ABC):
 
 @dataclasses.dataclass(frozen=True)
 class Filter:
-    """z⁺ = A z + B x, y = C z + D x with z = 0 at rest at x = 0.
+    """z⁺ = A z + B x, y = C z + D x with z = 0 at rest at x = 0."""
 
-    Attributes:
-        a, b, c: shapes (n, n), (n,), (n,); n may be 0.
-        d: direct gain.
-    """
-
-    a: FloatArray
+    a: FloatArray  # a, b, c: shapes (n, n), (n,), (n,); n may be 0
     b: FloatArray
     c: FloatArray
-    d: float
+    d: float  # direct gain
 
 
 @runtime_checkable

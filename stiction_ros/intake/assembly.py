@@ -38,19 +38,13 @@ from stiction_ros.texts import plural
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """What was read of one loop.
-
-    Attributes:
-        record: name of its records.
-        named: whether a user said which column is what.
-        shared: whether other loops stand in the same rows.
-    """
+    """What was read of one loop."""
 
     name: str
-    record: str
+    record: str  # name of its records
     blocks: tuple[Block, ...]
-    named: bool = False
-    shared: bool = False
+    named: bool = False  # whether a user said which column is what
+    shared: bool = False  # whether other loops stand in the same rows
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -97,31 +97,21 @@ class CsvColumns:
 
 @dataclasses.dataclass(frozen=True)
 class IntakeOptions:
-    """How exports are to be read.
+    """How exports are to be read."""
 
-    Attributes:
-        columns: which column is what, for files of one loop.
-        namespace: of the loop's topics, for bags that hold several loops.
-        tags: file that lists which tags make up which loop; None finds them by their names.
-        strict: whether anything that had to be repaired is a problem.
-        op_unit: of every OP; None takes it from the export.
-        time_unit: of times that are numbers; None takes it from the export.
-        dates: which comes first in dates; None finds out.
-        sample_time: s, of signals that were reported when they changed, and of rows without a
-            time; None finds it.
-        long: columns of tag, time and value of tables with one value a row; None finds them.
-        automatic: what MODE shows in automatic; None knows the usual words.
-    """
-
-    columns: CsvColumns = CsvColumns()
-    namespace: str | None = None
+    columns: CsvColumns = CsvColumns()  # which column is what, for files of one loop
+    namespace: str | None = None  # of the loop's topics, for bags that hold several loops
+    # file that lists which tags make up which loop; None finds them by their names
     tags: Path | None = None
-    strict: bool = False
-    op_unit: OpUnit | None = None
-    time_unit: TimeUnit | None = None
-    dates: DateOrder | None = None
+    strict: bool = False  # whether anything that had to be repaired is a problem
+    op_unit: OpUnit | None = None  # of every OP; None takes it from the export
+    time_unit: TimeUnit | None = None  # of times that are numbers; None takes it from the export
+    dates: DateOrder | None = None  # which comes first in dates; None finds out
+    # s, of signals that were reported when they changed, and of rows without a time; None finds it
     sample_time: float | None = None
+    # columns of tag, time and value of tables with one value a row; None finds them
     long: tuple[str, ...] | None = None
+    # what MODE shows in automatic; None knows the usual words
     automatic: tuple[str, ...] | None = None
 
 

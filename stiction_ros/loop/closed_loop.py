@@ -28,15 +28,10 @@ class Controller(Protocol):
 
 @dataclasses.dataclass(frozen=True)
 class ClosedLoopRun:
-    """Signals of a simulated loop.
+    """Signals of a simulated loop."""
 
-    Attributes:
-        record: op, pv, sp and the true stem positions.
-        pv_clean: outputs without noise, shape (N, p).
-    """
-
-    record: Record
-    pv_clean: FloatArray = dataclasses.field(repr=False)
+    record: Record  # op, pv, sp and the true stem positions
+    pv_clean: FloatArray = dataclasses.field(repr=False)  # outputs without noise, shape (N, p)
 
 
 def simulate_closed_loop(

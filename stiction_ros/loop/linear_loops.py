@@ -23,35 +23,21 @@ LANES = 8  # runs that go side by side: as many as a vector of the processor or 
 
 
 class Process(NamedTuple):
-    """Equation (9) of p outputs and m valves.
+    """Equation (9) of p outputs and m valves."""
 
-    Attributes:
-        a: a_1 … a_na, zeros behind, shape (p, na).
-        b: b_1 … b_nb, zeros behind, shape (p, m, nb).
-        delay: t_d, shape (p, m).
-        bias: shape (p,).
-    """
-
-    a: FloatArray
-    b: FloatArray
-    delay: IntArray
-    bias: FloatArray
+    a: FloatArray  # a_1 … a_na, zeros behind, shape (p, na)
+    b: FloatArray  # b_1 … b_nb, zeros behind, shape (p, m, nb)
+    delay: IntArray  # t_d, shape (p, m)
+    bias: FloatArray  # shape (p,)
 
 
 class Controllers(NamedTuple):
-    """One controller per valve; what is the same in all runs.
+    """One controller per valve; what is the same in all runs."""
 
-    Attributes:
-        output: index of the output that it reads, −1 for none, shape (m,).
-        lag: samples between PV and OP, shape (m,).
-        smoothing: share of the last value in the filter of e, shape (m,).
-        low, high: limits of OP, shape (m,).
-    """
-
-    output: IntArray
-    lag: IntArray
-    smoothing: FloatArray
-    low: FloatArray
+    output: IntArray  # index of the output that it reads, −1 for none, shape (m,)
+    lag: IntArray  # samples between PV and OP, shape (m,)
+    smoothing: FloatArray  # share of the last value in the filter of e, shape (m,)
+    low: FloatArray  # low, high: limits of OP, shape (m,)
     high: FloatArray
 
     @classmethod
@@ -64,23 +50,15 @@ class Controllers(NamedTuple):
 
 
 class Runs(NamedTuple):
-    """What differs from run to run, R runs.
+    """What differs from run to run, R runs."""
 
-    Attributes:
-        friction: (f_S, f_D), shape (R, m, 2).
-        tuning: (K, K_i, K_d), shape (R, m, 3).
-        pv: before the first sample, oldest first, shape (R, H, p).
-        stem: before the first sample, oldest first, shape (R, H, m).
-        op: the last one before the first sample, shape (R, m).
-        laws: per valve, whether Kano's or Choudhury's rules move its stem in place of He's law (4),
-            and by which factor a slip is longer than He's, shape (m, 3).
-    """
-
-    friction: FloatArray
-    tuning: FloatArray
-    pv: FloatArray
-    stem: FloatArray
-    op: FloatArray
+    friction: FloatArray  # (f_S, f_D), shape (R, m, 2)
+    tuning: FloatArray  # (K, K_i, K_d), shape (R, m, 3)
+    pv: FloatArray  # before the first sample, oldest first, shape (R, H, p)
+    stem: FloatArray  # before the first sample, oldest first, shape (R, H, m)
+    op: FloatArray  # the last one before the first sample, shape (R, m)
+    # per valve, whether Kano's or Choudhury's rules move its stem in place of He's law (4), and by
+    # which factor a slip is longer than He's, shape (m, 3)
     laws: FloatArray
 
 

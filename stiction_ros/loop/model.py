@@ -32,17 +32,11 @@ class Valve:
 
 @dataclasses.dataclass(frozen=True)
 class Disturbance:
-    """An unmeasured effect that adds to an output, a further input, or the stem of a valve.
+    """An unmeasured effect that adds to an output, a further input, or the stem of a valve."""
 
-    Attributes:
-        place: tag of the output, the input or the valve.
-        behaviour: what is added.
-        load: whether it enters the process beside the stem of a valve.
-    """
-
-    place: str
-    behaviour: Behaviour
-    load: bool = False
+    place: str  # tag of the output, the input or the valve
+    behaviour: Behaviour  # what is added
+    load: bool = False  # whether it enters the process beside the stem of a valve
 
 
 @dataclasses.dataclass(frozen=True)

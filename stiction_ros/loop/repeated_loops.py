@@ -29,19 +29,12 @@ Laws = Sequence[Sequence[Behaviour | None]]
 
 
 class Equations(NamedTuple):
-    """Of each of R runs, p outputs and m valves.
+    """Of each of R runs, p outputs and m valves."""
 
-    Attributes:
-        a: a_1 … a_n, shape (R, p, n).
-        b: b_1 … b_n, shape (R, p, m, n).
-        delay: d, the same in all runs, shape (p, m).
-        outside: ε, shape (R, p, N), the constant and waves in it.
-    """
-
-    a: FloatArray
-    b: FloatArray
-    delay: IntArray
-    outside: FloatArray
+    a: FloatArray  # a_1 … a_n, shape (R, p, n)
+    b: FloatArray  # b_1 … b_n, shape (R, p, m, n)
+    delay: IntArray  # d, the same in all runs, shape (p, m)
+    outside: FloatArray  # ε, shape (R, p, N), the constant and waves in it
 
 
 class Stems:

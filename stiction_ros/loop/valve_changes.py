@@ -18,16 +18,11 @@ class ValveChange:
     """From the first sample at or after a time on, a valve has other effects.
 
     The stem stays where it is, and the new effects begin at rest there.
-
-    Attributes:
-        time: seconds since the first sample.
-        valve: tag.
-        effects: in signal order; none for a valve that follows OP.
     """
 
-    time: float
-    valve: str
-    effects: tuple[Behaviour, ...]
+    time: float  # seconds since the first sample
+    valve: str  # tag
+    effects: tuple[Behaviour, ...]  # in signal order; none for a valve that follows OP
 
 
 def read_valve_changes(

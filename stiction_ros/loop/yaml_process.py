@@ -30,16 +30,11 @@ _KINDS = ("arx", "state_space", "transfer_function", "stirred_tank")
 
 @dataclasses.dataclass(frozen=True)
 class Instrument:
-    """Limits of one measured output; infinite where nothing is known.
+    """Limits of one measured output; infinite where nothing is known."""
 
-    Attributes:
-        low, high: range, engineering units.
-        rate_limit: fastest credible change of the measurement, units per second.
-    """
-
-    low: float = -math.inf
+    low: float = -math.inf  # low, high: range, engineering units
     high: float = math.inf
-    rate_limit: float = math.inf
+    rate_limit: float = math.inf  # fastest credible change of the measurement, units per second
 
 
 def read_process(

@@ -45,17 +45,11 @@ def parse_yaml(text: str, where: str) -> Any:
 
 @dataclasses.dataclass(frozen=True)
 class TextLimits:
-    """What a YAML text from outside may need to be read: time and memory are bounded by these.
+    """What a YAML text from outside may need to be read: time and memory are bounded by these."""
 
-    Attributes:
-        characters: of the text.
-        depth: lists and mappings within one another.
-        nodes: values, keys, lists and mappings altogether.
-    """
-
-    characters: int = 65_536
-    depth: int = 20
-    nodes: int = 2000
+    characters: int = 65_536  # of the text
+    depth: int = 20  # lists and mappings within one another
+    nodes: int = 2000  # values, keys, lists and mappings altogether
 
 
 def parse_limited(text: str, where: str, limits: TextLimits = TextLimits()) -> Any:

@@ -41,15 +41,10 @@ class Span:
 
 @dataclasses.dataclass(frozen=True)
 class TagHistory:
-    """What a server kept of one tag.
+    """What a server kept of one tag."""
 
-    Attributes:
-        stamps: ns, rising, shape (K,).
-        values: NaN where the quality is not good, shape (K,).
-    """
-
-    stamps: np.ndarray[Any, np.dtype[np.int64]]
-    values: FloatArray
+    stamps: np.ndarray[Any, np.dtype[np.int64]]  # ns, rising, shape (K,)
+    values: FloatArray  # NaN where the quality is not good, shape (K,)
 
     def at(self, times: np.ndarray[Any, np.dtype[np.int64]]) -> FloatArray:
         """Return the last values with stamps up to ``times`` (ns); NaN before the first."""

@@ -28,42 +28,26 @@ MODE_REFUSES = "the mode does not grant it"
 
 @dataclasses.dataclass(frozen=True)
 class WriteOrder:
-    """What to write in one call of the service.
+    """What to write in one call of the service."""
 
-    Attributes:
-        loop: that it belongs to.
-        kind: of what.
-        values: node and value each.
-        modes: nodes that must say one of ``granted`` right before it is written.
-        granted: see ``modes``.
-        expires: s on our clock after which it is not written any more.
-    """
-
-    loop: str
-    kind: Use
-    values: tuple[tuple[str, float], ...]
-    expires: float
-    modes: tuple[str, ...] = ()
-    granted: tuple[str, ...] = ()
+    loop: str  # that it belongs to
+    kind: Use  # of what
+    values: tuple[tuple[str, float], ...]  # node and value each
+    expires: float  # s on our clock after which it is not written any more
+    modes: tuple[str, ...] = ()  # nodes that must say one of ``granted`` right before it is written
+    granted: tuple[str, ...] = ()  # see ``modes``
 
 
 @dataclasses.dataclass(frozen=True)
 class BridgeRules:
-    """How a loop is bridged.
+    """How a loop is bridged."""
 
-    Attributes:
-        speed: seconds of the plant per second of our clock.
-        writes: whether anything may be written at all.
-        asks: whether the grant is asked for at the start.
-        commander: full name of the node whose OP is taken; empty for the first that commands.
-        identity: number that tells our heartbeat from others', 1 … 32 767.
-    """
-
-    speed: float = 1.0
-    writes: bool = False
-    asks: bool = False
+    speed: float = 1.0  # seconds of the plant per second of our clock
+    writes: bool = False  # whether anything may be written at all
+    asks: bool = False  # whether the grant is asked for at the start
+    # full name of the node whose OP is taken; empty for the first that commands
     commander: str = ""
-    identity: int = 1
+    identity: int = 1  # number that tells our heartbeat from others', 1 … 32 767
 
 
 class LoopBridge:

@@ -16,16 +16,11 @@ WATCHED = 60  # OPs that are looked back at
 
 @dataclasses.dataclass(frozen=True)
 class OpLimits:
-    """Limits of the OPs of a loop.
+    """Limits of the OPs of a loop."""
 
-    Attributes:
-        low, high: %, shapes (m,).
-        rate: % per second, shape (m,).
-    """
-
-    low: FloatArray
+    low: FloatArray  # low, high: %, shapes (m,)
     high: FloatArray
-    rate: FloatArray
+    rate: FloatArray  # % per second, shape (m,)
 
     def within(self, op: FloatArray) -> bool:
         """Return whether each of ``op`` (m,), %, is a number between its limits."""

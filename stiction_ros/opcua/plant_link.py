@@ -33,23 +33,15 @@ ROOM = 200_000  # changes that wait here
 
 @dataclasses.dataclass(frozen=True)
 class LinkSettings:
-    """Where to, how, and what is heard there.
+    """Where to, how, and what is heard there."""
 
-    Attributes:
-        url: of the server.
-        credentials: of the session.
-        tags: that are subscribed to.
-        written: tags that may be written, and what for; empty for none.
-        publishing: s between two publications of the server.
-        asked_again: s until tags that the server refuses are tried again.
-    """
-
-    url: str
-    credentials: Credentials
-    tags: tuple[str, ...]
+    url: str  # of the server
+    credentials: Credentials  # of the session
+    tags: tuple[str, ...]  # that are subscribed to
+    # tags that may be written, and what for; empty for none
     written: Mapping[str, Use] = dataclasses.field(default_factory=dict)
-    publishing: float = 0.1
-    asked_again: float = ASKED_AGAIN
+    publishing: float = 0.1  # s between two publications of the server
+    asked_again: float = ASKED_AGAIN  # s until tags that the server refuses are tried again
 
 
 @dataclasses.dataclass(frozen=True, slots=True)

@@ -23,19 +23,12 @@ class TagQuality(enum.IntEnum):
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class TagReading:
-    """One report of one tag.
+    """One report of one tag."""
 
-    Attributes:
-        value: as it was sent; None when there was none.
-        quality: of the value.
-        stamp: source time stamp, ns.
-        first: whether it opens a subscription; it then tells the present value, whose stamp may
-            be long past.
-    """
-
-    value: float | str | None
-    quality: TagQuality
-    stamp: int
+    value: float | str | None  # as it was sent; None when there was none
+    quality: TagQuality  # of the value
+    stamp: int  # source time stamp, ns
+    # whether it opens a subscription; it then tells the present value, whose stamp may be long past
     first: bool = False
 
     @property

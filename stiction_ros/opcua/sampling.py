@@ -27,23 +27,15 @@ NOTHING = TagReading(None, TagQuality.SILENT, 0)
 
 @dataclasses.dataclass(frozen=True)
 class PlantSample:
-    """One sample of a loop.
+    """One sample of a loop."""
 
-    Attributes:
-        stamp: ns, by the plant's clock.
-        pv, sp, dv: shapes (p,), (p,), (d,); NaN where the quality is not good.
-        pv_age: s of the plant's time since each PV changed, shape (p,).
-        pv_quality: of each PV.
-        op_before: OP in force in the sample before, shape (m,), %; NaN where not known.
-    """
-
-    stamp: int
-    pv: FloatArray
+    stamp: int  # ns, by the plant's clock
+    pv: FloatArray  # pv, sp, dv: shapes (p,), (p,), (d,); NaN where the quality is not good
     sp: FloatArray
     dv: FloatArray
-    pv_age: FloatArray
-    pv_quality: tuple[TagQuality, ...]
-    op_before: FloatArray
+    pv_age: FloatArray  # s of the plant's time since each PV changed, shape (p,)
+    pv_quality: tuple[TagQuality, ...]  # of each PV
+    op_before: FloatArray  # OP in force in the sample before, shape (m,), %; NaN where not known
 
 
 class PlantClock:

@@ -23,22 +23,14 @@ SECURITY = ("sign_and_encrypt", "none")
 
 @dataclasses.dataclass(frozen=True)
 class Credentials:
-    """How a session is secured; nothing secret is kept here, only where it stands.
+    """How a session is secured; nothing secret is kept here, only where it stands."""
 
-    Attributes:
-        security: ``sign_and_encrypt`` (Basic256Sha256) or ``none``.
-        certificate, private_key: files of ours, DER and PEM.
-        server_certificate: file of the certificate that the server must show, DER.
-        user: name; empty for none.
-        password_file: file of the password.
-    """
-
-    security: str = SECURITY[0]
-    certificate: str = ""
+    security: str = SECURITY[0]  # ``sign_and_encrypt`` (Basic256Sha256) or ``none``
+    certificate: str = ""  # certificate, private_key: files of ours, DER and PEM
     private_key: str = ""
-    server_certificate: str = ""
-    user: str = ""
-    password_file: str = ""
+    server_certificate: str = ""  # file of the certificate that the server must show, DER
+    user: str = ""  # name; empty for none
+    password_file: str = ""  # file of the password
 
     @classmethod
     def of(cls, given: object) -> Credentials:
@@ -143,21 +135,13 @@ def fingerprint(certificate: x509.Certificate) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Identity:
-    """What a certificate says of its owner.
+    """What a certificate says of its owner."""
 
-    Attributes:
-        uri: of the application.
-        hosts: names and addresses.
-        server: whether it is a server's, else a client's.
-        begin: first moment of validity.
-        days: of validity.
-    """
-
-    uri: str
-    hosts: tuple[str, ...]
-    server: bool
-    begin: datetime.datetime
-    days: int = DAYS
+    uri: str  # of the application
+    hosts: tuple[str, ...]  # names and addresses
+    server: bool  # whether it is a server's, else a client's
+    begin: datetime.datetime  # first moment of validity
+    days: int = DAYS  # of validity
 
 
 def make_certificate(identity: Identity, certificate: Path, private_key: Path) -> None:

@@ -16,19 +16,13 @@ UNCYCLED = 240  # samples of the window where there is no cycle
 
 @dataclasses.dataclass(frozen=True)
 class Window:
-    """The part of a record that is shown closely.
+    """The part of a record that is shown closely."""
 
-    Attributes:
-        valve, output: indices.
-        first, last: its first row and the one behind its last.
-        period: of the cycle, s; None where there is none.
-    """
-
-    valve: int
+    valve: int  # valve, output: indices
     output: int
-    first: int
+    first: int  # first, last: its first row and the one behind its last
     last: int
-    period: float | None
+    period: float | None  # of the cycle, s; None where there is none
 
     @classmethod
     def of(cls, record: Record, found: Identification) -> Window:

@@ -37,19 +37,12 @@ Progress = Callable[[float], None]
 
 @dataclasses.dataclass(frozen=True)
 class GridPoint:
-    """The best point of a grid.
+    """The best point of a grid."""
 
-    Attributes:
-        friction: rows (f_S, f_D), shape (m, 2), %.
-        delays: for each output the t_d of each valve, samples.
-        found: stems and ARX models there; its ``squared_error`` is (12a).
-        points: grid points that were worked through.
-    """
-
-    friction: FloatArray
-    delays: Delays
-    found: EquationError
-    points: int
+    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
+    delays: Delays  # for each output the t_d of each valve, samples
+    found: EquationError  # stems and ARX models there; its ``squared_error`` is (12a)
+    points: int  # grid points that were worked through
 
 
 def nodes(limit: float, step: float) -> FloatArray:

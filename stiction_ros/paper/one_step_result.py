@@ -40,25 +40,16 @@ NO_EVIDENCE = (
 
 @dataclasses.dataclass(frozen=True)
 class Answer:
-    """Where a method ended.
+    """Where a method ended."""
 
-    Attributes:
-        reason: why the answer is not to be trusted; empty when it is.
-        friction: rows (f_S, f_D), shape (m, 2), %.
-        delays: t_d per output and valve, samples.
-        objective: (12a) as the method has it; None for that of the hard law.
-        points: frictions at which it was evaluated.
-        found: models and stems that go with it; None for those of the hard law.
-        starts: every run of a solver.
-    """
-
-    reason: str
-    friction: FloatArray
-    delays: Delays
-    objective: float | None
-    points: int
+    reason: str  # why the answer is not to be trusted; empty when it is
+    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
+    delays: Delays  # t_d per output and valve, samples
+    objective: float | None  # (12a) as the method has it; None for that of the hard law
+    points: int  # frictions at which it was evaluated
+    # models and stems that go with it; None for those of the hard law
     found: EquationError | None = None
-    starts: tuple[SolvedStart, ...] = ()
+    starts: tuple[SolvedStart, ...] = ()  # every run of a solver
 
 
 def check_record(record: Record, options: PaperOptions) -> ArxOrders:

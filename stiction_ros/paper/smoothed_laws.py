@@ -35,22 +35,14 @@ Step = Callable[[Sequence[Any], tuple[Any, Any], tuple[Any, Any], Any, Any], lis
 
 @dataclasses.dataclass(frozen=True)
 class SmoothLaw:
-    """One law in both forms.
+    """One law in both forms."""
 
-    Attributes:
-        name: of the hard law.
-        kind: its class.
-        states: entries of the state of the smoothed law.
-        simulated: stem, shape (N,), %, of OP (N,), f_S, f_D, % and τ, 1/%; from rest at the
-            first OP.
-        step: state, (u_k, u_{k−1}), (f_S, f_D), τ and tanh → next state; numbers or CasADi.
-    """
-
-    name: str
-    kind: Any
-    states: int
+    name: str  # of the hard law
+    kind: Any  # its class
+    states: int  # entries of the state of the smoothed law
+    # stem, shape (N,), %, of OP (N,), f_S, f_D, % and τ, 1/%; from rest at the first OP
     simulated: Simulated
-    step: Step
+    step: Step  # state, (u_k, u_{k−1}), (f_S, f_D), τ and tanh → next state; numbers or CasADi
 
     def stems(self, op: FloatArray, friction: FloatArray, smoothing: FloatArray) -> FloatArray:
         """Return smoothed stems, shape (m, N), %, of OP, shape (N, m), %.

@@ -24,23 +24,14 @@ MIN_SAMPLES = 4  # of a part that is looked at
 
 @dataclasses.dataclass(frozen=True)
 class SustainedOscillation:
-    """Δu of one valve and what speaks for it.
+    """Δu of one valve and what speaks for it."""
 
-    Attributes:
-        valve: tag.
-        span: Δu, %.
-        sustained: whether another part repeats it; False where the span of OP stands in.
-        whole: span of OP over the record, %.
-        parts: first row and one past the last of every part looked at.
-        spans: of OP in each part, %.
-    """
-
-    valve: str
-    span: float
-    sustained: bool
-    whole: float
-    parts: tuple[tuple[int, int], ...]
-    spans: tuple[float, ...]
+    valve: str  # tag
+    span: float  # Δu, %
+    sustained: bool  # whether another part repeats it; False where the span of OP stands in
+    whole: float  # span of OP over the record, %
+    parts: tuple[tuple[int, int], ...]  # first row and one past the last of every part looked at
+    spans: tuple[float, ...]  # of OP in each part, %
 
     @property
     def alike(self) -> int:

@@ -19,28 +19,18 @@ IndexArray = np.ndarray[tuple[int], np.dtype[np.intp]]
 
 
 class Gap(NamedTuple):
-    """Where a record goes on after a gap, or where another run begins.
+    """Where a record goes on after a gap, or where another run begins."""
 
-    Attributes:
-        row: first sample behind it.
-        start: time of that sample on the record's own clock, s.
-    """
-
-    row: int
-    start: float
+    row: int  # first sample behind it
+    start: float  # time of that sample on the record's own clock, s
 
 
 class Segment(NamedTuple):
-    """A stretch of samples without a gap.
+    """A stretch of samples without a gap."""
 
-    Attributes:
-        first, last: its samples, ``last`` not included.
-        start: time of the first on the record's own clock, s.
-    """
-
-    first: int
+    first: int  # first, last: its samples, ``last`` not included
     last: int
-    start: float
+    start: float  # time of the first on the record's own clock, s
 
 
 @dataclasses.dataclass(frozen=True)

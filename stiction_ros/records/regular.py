@@ -43,20 +43,13 @@ WHOLE = 1e-3
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """One stretch of samples without a gap.
+    """One stretch of samples without a gap."""
 
-    Attributes:
-        first, last: rows of the file that it is made of, ``last`` not included.
-        time: regular times, shape (N,), s; the given ones where nothing was repaired.
-        place: of each row among the times, increasing, shape (rows,).
-        note: what was done; empty for nothing.
-    """
-
-    first: int
+    first: int  # first, last: rows of the file that it is made of, ``last`` not included
     last: int
-    time: FloatArray
-    place: IntArray
-    note: str = ""
+    time: FloatArray  # regular times, shape (N,), s; the given ones where nothing was repaired
+    place: IntArray  # of each row among the times, increasing, shape (rows,)
+    note: str = ""  # what was done; empty for nothing
 
     @property
     def missing(self) -> NDArray[np.bool_]:

@@ -18,20 +18,15 @@ STANDS = 1e-9  # share of the stem's range up to which a move is rounding
 class ValveWork:
     """The work of one valve over a stretch of time, or per hour.
 
-    Attributes:
-        travel: Σ|Δχ|, %.
-        moves: samples at which the stem moves.
-        reversals: moves in the other direction than the one before.
-
     Examples:
         >>> import numpy as np
         >>> ValveWork.of(np.array([50.0, 58.0, 58.0, 50.0]))
         ValveWork(travel=16.0, moves=2.0, reversals=1.0)
     """
 
-    travel: float
-    moves: float
-    reversals: float
+    travel: float  # Σ|Δχ|, %
+    moves: float  # samples at which the stem moves
+    reversals: float  # moves in the other direction than the one before
 
     @classmethod
     def of(cls, stem: FloatArray) -> ValveWork:

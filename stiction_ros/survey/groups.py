@@ -22,17 +22,11 @@ NEARNESS = {"valve": 0, "tuning": 1, "unknown": 2, "none": 2, "disturbance": 3, 
 
 @dataclasses.dataclass(frozen=True)
 class Group:
-    """Loops that cycle together.
+    """Loops that cycle together."""
 
-    Attributes:
-        number: from 1.
-        period: s, the median.
-        names: of the loops, the likely source first.
-    """
-
-    number: int
-    period: float
-    names: tuple[str, ...]
+    number: int  # from 1
+    period: float  # s, the median
+    names: tuple[str, ...]  # of the loops, the likely source first
 
 
 def grouped(entries: Sequence[Entry]) -> tuple[list[Entry], list[Group]]:

@@ -31,17 +31,12 @@ FirstSlip = tuple[int, float]
 
 @dataclasses.dataclass(frozen=True)
 class MovingTrace:
-    """Where one valve moves, stops and slips, and what that says of J and S.
+    """Where one valve moves, stops and slips, and what that says of J and S."""
 
-    Attributes:
-        base: OP at the last moving sample, before the first slip the stem's level, shape (N,).
-        sign: direction of the last motion, 0 before the first, shape (N,).
-        bounds: (J low, J high, S low, S high), %.
-    """
-
+    # OP at the last moving sample, before the first slip the stem's level, shape (N,)
     base: FloatArray
-    sign: FloatArray
-    bounds: tuple[float, float, float, float]
+    sign: FloatArray  # direction of the last motion, 0 before the first, shape (N,)
+    bounds: tuple[float, float, float, float]  # (J low, J high, S low, S high), %
 
 
 class MovingRules(ABC):

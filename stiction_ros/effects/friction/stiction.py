@@ -112,16 +112,7 @@ class JumpForm:
 
 @dataclasses.dataclass(frozen=True)
 class Stiction(Behaviour):
-    """What holds for every friction law that does not say otherwise.
-
-    Attributes:
-        switching: how its switching patterns are listed, so that a search can be exact:
-            :data:`SLIPS`, or the rules of a law with a moving state. The exact search refuses a law
-            with None, the default search takes it.
-        not_identified: why it is not identified, one clause; empty when it is.
-        held: keys of further parameters that stay at their defaults, which is said: constants of
-            the law. All others are identified.
-    """
+    """What holds for every friction law that does not say otherwise."""
 
     effect: ClassVar[str] = "stiction"
     places: ClassVar[tuple[str, ...]] = ("valve",)
@@ -135,8 +126,13 @@ class Stiction(Behaviour):
     family: ClassVar[str] = "friction"
     least: ClassVar[float] = 0.1  # %
     # For `stiction identify`.
+    # how its switching patterns are listed, so that a search can be exact: ``SLIPS``, or the rules
+    # of a law with a moving state. The exact search refuses a law with None, the default search
+    # takes it
     switching: ClassVar[Switching] = None
-    not_identified: ClassVar[str] = ""
+    not_identified: ClassVar[str] = ""  # why it is not identified, one clause; empty when it is
+    # keys of further parameters that stay at their defaults, which is said: constants of the law.
+    # All others are identified
     held: ClassVar[tuple[str, ...]] = ()
     told_of_step: ClassVar[tuple[str, ...]] = (
         *Behaviour.told_of_step,

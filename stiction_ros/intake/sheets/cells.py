@@ -67,17 +67,12 @@ def as_text(cells: Cells) -> Sequence[str]:
 
 @dataclasses.dataclass
 class Numbers:
-    """A column of numbers as it grows.
+    """A column of numbers as it grows."""
 
-    Attributes:
-        decimal_comma: whether a comma alone in a number is the decimal one; else it sets
-            thousands apart.
-        wrong: first cell that is no finite number, None for none.
-        words: what stood in the place of numbers, with its count; empty cells as ``''``.
-    """
-
+    # whether a comma alone in a number is the decimal one; else it sets thousands apart
     decimal_comma: bool
-    wrong: Wrong | None = None
+    wrong: Wrong | None = None  # first cell that is no finite number, None for none
+    # what stood in the place of numbers, with its count; empty cells as ``''``
     words: Counter[str] = dataclasses.field(default_factory=Counter)
     _pieces: list[FloatArray] = dataclasses.field(default_factory=list)
     _blank: list[NDArray[np.bool_]] = dataclasses.field(default_factory=list)

@@ -26,21 +26,14 @@ _BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
 
 @dataclasses.dataclass(frozen=True)
 class Layout:
-    """Where things are in a table.
+    """Where things are in a table."""
 
-    Attributes:
-        header: names of the columns, without units in brackets; empty when there is none.
-        given: names as they stand there.
-        units: unit of each column, empty where not known.
-        first: row of cells (not counting blank ones) at which data begin.
-        place: row of cells of the header.
-    """
-
+    # names of the columns, without units in brackets; empty when there is none
     header: tuple[str, ...]
-    given: tuple[str, ...]
-    units: tuple[str, ...]
-    first: int = 0
-    place: int = 0
+    given: tuple[str, ...]  # names as they stand there
+    units: tuple[str, ...]  # unit of each column, empty where not known
+    first: int = 0  # row of cells (not counting blank ones) at which data begin
+    place: int = 0  # row of cells of the header
 
 
 def delimiter_of(lines: Sequence[str]) -> str:

@@ -37,23 +37,14 @@ Piece = tuple[Sequence[Cells], NDArray[np.int64]]
 
 
 class Sheet(abc.ABC):
-    """A table with a header.
+    """A table with a header."""
 
-    Attributes:
-        path: of the file.
-        name: of the table: the file's, and the sheet's of a workbook that has several.
-        layout: header, units, where data begin.
-        decimal_comma: whether a comma alone in a number is the decimal one.
-        header_once: whether no row of data may be taken for the header that returns.
-        row_word: what a row is called in errors.
-    """
-
-    path: Path
-    name: str
-    layout: Layout
-    decimal_comma: bool = False
-    header_once: bool = False
-    row_word: str = "line"
+    path: Path  # of the file
+    name: str  # of the table: the file's, and the sheet's of a workbook that has several
+    layout: Layout  # header, units, where data begin
+    decimal_comma: bool = False  # whether a comma alone in a number is the decimal one
+    header_once: bool = False  # whether no row of data may be taken for the header that returns
+    row_word: str = "line"  # what a row is called in errors
 
     @property
     def mended(self) -> list[str]:

@@ -34,29 +34,20 @@ class Shape(enum.Enum):
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Which column is what.
+    """Which column is what."""
 
-    Attributes:
-        shape: of the table.
-        time: column of the times; its place is -1 where rows are a sample time apart.
-        own: column of a signal to its own column of times, empty where one is of all.
-        loops: name of each loop to its signals' columns; of a long table empty.
-        quality: column of a signal to the columns of its quality.
-        whole_quality: columns with the quality of whole rows.
-        long: columns of a table with one value a row.
-        named: whether the user named the columns.
-        notes: what was left out.
-    """
-
-    shape: Shape
-    time: TimeColumn
+    shape: Shape  # of the table
+    time: TimeColumn  # column of the times; its place is -1 where rows are a sample time apart
+    # name of each loop to its signals' columns; of a long table empty
     loops: Mapping[str, Mapping[Key, int]]
+    # column of a signal to its own column of times, empty where one is of all
     own: Mapping[int, TimeColumn] = dataclasses.field(default_factory=dict)
+    # column of a signal to the columns of its quality
     quality: Mapping[int, tuple[int, ...]] = dataclasses.field(default_factory=dict)
-    whole_quality: tuple[int, ...] = ()
-    long: OneValue | None = None
-    named: bool = False
-    notes: tuple[str, ...] = ()
+    whole_quality: tuple[int, ...] = ()  # columns with the quality of whole rows
+    long: OneValue | None = None  # columns of a table with one value a row
+    named: bool = False  # whether the user named the columns
+    notes: tuple[str, ...] = ()  # what was left out
 
 
 def plan_of(sheet: Sheet, options: IntakeOptions, tags: TagList | None) -> Plan:

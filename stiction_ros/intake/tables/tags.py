@@ -38,18 +38,13 @@ class FileWay:
 
 @dataclasses.dataclass(frozen=True)
 class TagList:
-    """Which tags make up which loop.
+    """Which tags make up which loop."""
 
-    Attributes:
-        loops: name of the loop, signal, for each tag in small letters.
-        units: unit of OP of loops of which the list says it.
-        rows: rows that count for one file alone, by its name.
-        own: in the list of a file the tags that its rows name, by their small letters.
-    """
-
-    loops: Mapping[str, Tag]
-    units: Mapping[str, OpUnit]
+    loops: Mapping[str, Tag]  # name of the loop, signal, for each tag in small letters
+    units: Mapping[str, OpUnit]  # unit of OP of loops of which the list says it
+    # rows that count for one file alone, by its name
     rows: Mapping[str, Sequence[TagRow]] = dataclasses.field(default_factory=dict)
+    # in the list of a file the tags that its rows name, by their small letters
     own: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def read(self, name: str) -> Tag | None:

@@ -26,17 +26,11 @@ MISMATCH = 0.08  # standard error of a share that no number of moves takes away
 
 @dataclasses.dataclass(frozen=True)
 class OutputReference:
-    """One output as it was known when trust began.
+    """One output as it was known when trust began."""
 
-    Attributes:
-        model: linear part.
-        ar: φ of the AR noise of its free run, shape (p ≤ 6,).
-        std: of the innovations behind the high-pass, units of the output.
-    """
-
-    model: OutputModel
-    ar: FloatArray
-    std: float
+    model: OutputModel  # linear part
+    ar: FloatArray  # φ of the AR noise of its free run, shape (p ≤ 6,)
+    std: float  # of the innovations behind the high-pass, units of the output
 
     @property
     def reach(self) -> int:
@@ -129,19 +123,12 @@ def _noise_of(
 
 @dataclasses.dataclass(frozen=True)
 class Share:
-    """How much of a signature a stretch of samples shows: 0 nothing of it, 1 all.
+    """How much of a signature a stretch of samples shows: 0 nothing of it, 1 all."""
 
-    Attributes:
-        value: by weighted least squares.
-        error: its standard error, from how the episodes of moves differ.
-        information: squared length of the signature, in σ.
-        episodes, moves: that the signature has in the stretch.
-    """
-
-    value: float
-    error: float
-    information: float
-    episodes: int
+    value: float  # by weighted least squares
+    error: float  # its standard error, from how the episodes of moves differ
+    information: float  # squared length of the signature, in σ
+    episodes: int  # episodes, moves: that the signature has in the stretch
     moves: int
 
     @property

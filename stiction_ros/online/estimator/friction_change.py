@@ -72,16 +72,11 @@ class ChangeRule:
 
 @dataclasses.dataclass(frozen=True)
 class LeadIn:
-    """Samples before a change, and where the stems were.
+    """Samples before a change, and where the stems were."""
 
-    Attributes:
-        op, stem: shape (n, m), %.
-        pv: shape (n, p).
-    """
-
-    op: FloatArray
+    op: FloatArray  # op, stem: shape (n, m), %
     stem: FloatArray
-    pv: FloatArray
+    pv: FloatArray  # shape (n, p)
 
     @classmethod
     def last_of(cls, op: FloatArray, stem: FloatArray, pv: FloatArray) -> LeadIn:
@@ -91,26 +86,18 @@ class LeadIn:
 
 @dataclasses.dataclass(frozen=True)
 class FrictionChange:
-    """The verdict on one valve.
+    """The verdict on one valve."""
 
-    Attributes:
-        status: unchanged, serviced or changed.
-        valve: tag.
-        samples: samples of the window that follow the change; 0 when unchanged.
-        friction: the new one, with intervals; None when unchanged or serviced.
-        doubted: whether the window speaks against the trusted friction, if not enough.
-        explained: whether process and trusted friction explain the window as they should.
-        share: of the new friction's signature, None where nothing was measured.
-        before: the window up to the change, None when unchanged.
-    """
-
-    status: ChangeStatus
-    valve: str
-    samples: int = 0
+    status: ChangeStatus  # unchanged, serviced or changed
+    valve: str  # tag
+    samples: int = 0  # samples of the window that follow the change; 0 when unchanged
+    # the new one, with intervals; None when unchanged or serviced
     friction: TrustedFriction | None = None
-    doubted: bool = False
+    doubted: bool = False  # whether the window speaks against the trusted friction, if not enough
+    # whether process and trusted friction explain the window as they should
     explained: bool = False
-    share: Share | None = None
+    share: Share | None = None  # of the new friction's signature, None where nothing was measured
+    # the window up to the change, None when unchanged
     before: LeadIn | None = dataclasses.field(default=None, compare=False, repr=False)
 
 

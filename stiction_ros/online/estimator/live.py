@@ -85,20 +85,14 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
 
 @dataclasses.dataclass(frozen=True)
 class FitUpdate:
-    """What one fit says and changes.
+    """What one fit says and changes."""
 
-    Attributes:
-        end: last sample of the window.
-        identification: the fit itself.
-        trusted: trusted friction by valve after this fit.
-        loop_model: the loop with the trusted friction, only when it differs from before.
-        changes: what the window says of changes of the friction trusted before, by valve.
-    """
-
-    end: int
-    identification: Identification
-    trusted: Mapping[str, TrustedFriction]
+    end: int  # last sample of the window
+    identification: Identification  # the fit itself
+    trusted: Mapping[str, TrustedFriction]  # trusted friction by valve after this fit
+    # the loop with the trusted friction, only when it differs from before
     loop_model: LoopModel | None
+    # what the window says of changes of the friction trusted before, by valve
     changes: tuple[FrictionChange, ...] = ()
 
 

@@ -13,17 +13,12 @@ SILENT = 10  # samples without a word after which nobody tells any more
 
 @dataclasses.dataclass(frozen=True)
 class Given:
-    """What the valves were given at one sample.
+    """What the valves were given at one sample."""
 
-    Attributes:
-        op: shape (m,), %; None when nobody tells.
-        known: whether it is known; without ``op`` it is then the controller's own OP.
-        ours: whether it comes from the controller, as limited or as late as it may be, and not
-            from someone else who has the valves.
-    """
-
-    op: FloatArray | None = None
-    known: bool = True
+    op: FloatArray | None = None  # shape (m,), %; None when nobody tells
+    known: bool = True  # whether it is known; without ``op`` it is then the controller's own OP
+    # whether it comes from the controller, as limited or as late as it may be, and not from someone
+    # else who has the valves
     ours: bool = True
 
 

@@ -30,17 +30,11 @@ class Reception(enum.Enum):
 
 @dataclasses.dataclass(frozen=True)
 class CommandRules:
-    """What a plant or driver asks of an OP.
+    """What a plant or driver asks of an OP."""
 
-    Attributes:
-        commander: full name of the only node that may command; empty for the first that does.
-        step: from one sample to the next, ns.
-        exact: only the OP that bears the stamp of the present sample is taken (lockstep).
-    """
-
-    commander: str
-    step: int
-    exact: bool
+    commander: str  # full name of the only node that may command; empty for the first that does
+    step: int  # from one sample to the next, ns
+    exact: bool  # only the OP that bears the stamp of the present sample is taken (lockstep)
 
 
 class OpPort:

@@ -20,22 +20,15 @@ from stiction_ros.records import Record
 
 @dataclasses.dataclass(frozen=True)
 class GapFinding:
-    """What was found in one window.
+    """What was found in one window."""
 
-    Attributes:
-        begin, end: first and last sample of the window, counted from the first of the run.
-        verdict: None when the window could not be used.
-        text: one sentence.
-        effects: each in a few words.
-        document: the mapping of ``gap --json`` without ``model_before`` and ``seconds``; its
-            times are seconds since ``begin``.
-    """
-
-    begin: int
+    begin: int  # begin, end: first and last sample of the window, counted from the first of the run
     end: int
-    verdict: GapVerdict | None
-    text: str
-    effects: tuple[str, ...]
+    verdict: GapVerdict | None  # None when the window could not be used
+    text: str  # one sentence
+    effects: tuple[str, ...]  # each in a few words
+    # the mapping of ``gap --json`` without ``model_before`` and ``seconds``; its times are seconds
+    # since ``begin``
     document: Mapping[str, Any]
 
     @property

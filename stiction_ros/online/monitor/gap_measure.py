@@ -49,26 +49,17 @@ class OutputBaseline:
 
 @dataclasses.dataclass(frozen=True)
 class OutputLook:
-    """One output in one window, units of the output.
+    """One output in one window, units of the output."""
 
-    Attributes:
-        name: tag.
-        gap: standard deviation s₁ of the innovations of the model's free run, under the noise
-            of the baseline.
-        baseline: the same in the baseline, s₀.
-        limit: of s₁/s₀, for a healthy loop to exceed as seldom as asked.
-        back: of s₁/s₀, below which a gap that had grown counts as gone.
-        free_run_rmse: of PV less the free run, on rows that nothing was fitted to.
-        noise_floor: standard deviation of the noise of the baseline in a free run.
-    """
-
-    name: str
+    name: str  # tag
+    # standard deviation s₁ of the innovations of the model's free run, under the noise of the
+    # baseline
     gap: float
-    baseline: float
-    limit: float
-    back: float
-    free_run_rmse: float
-    noise_floor: float
+    baseline: float  # the same in the baseline, s₀
+    limit: float  # of s₁/s₀, for a healthy loop to exceed as seldom as asked
+    back: float  # of s₁/s₀, below which a gap that had grown counts as gone
+    free_run_rmse: float  # of PV less the free run, on rows that nothing was fitted to
+    noise_floor: float  # standard deviation of the noise of the baseline in a free run
 
     @property
     def growth(self) -> float:

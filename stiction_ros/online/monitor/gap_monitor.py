@@ -57,23 +57,15 @@ class MonitorRule:
 
 @dataclasses.dataclass(frozen=True)
 class GapLook:
-    """One measurement of the gap.
+    """One measurement of the gap."""
 
-    Attributes:
-        begin, end: first and last sample of the window.
-        outputs: empty when the window could not be used.
-        grown: whether the gap counts as grown now.
-        alarm: whether it has grown with this window.
-        failure: why the window could not be used, or empty.
-        job: model and window that the workflow is to look into, or None.
-    """
-
-    begin: int
+    begin: int  # begin, end: first and last sample of the window
     end: int
-    outputs: tuple[OutputLook, ...]
-    grown: bool
-    alarm: bool = False
-    failure: str = ""
+    outputs: tuple[OutputLook, ...]  # empty when the window could not be used
+    grown: bool  # whether the gap counts as grown now
+    alarm: bool = False  # whether it has grown with this window
+    failure: str = ""  # why the window could not be used, or empty
+    # model and window that the workflow is to look into, or None
     job: tuple[LoopModel, Record] | None = None
 
     @property

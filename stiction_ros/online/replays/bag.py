@@ -52,15 +52,11 @@ class Signal:
 
 @dataclasses.dataclass(frozen=True)
 class PublishedFit:
-    """One message of ``stiction``.
+    """One message of ``stiction``."""
 
-    Attributes:
-        rows: value, lower and upper end by ``V1.f_s``, %; empty for an unusable window.
-        token: ``valid_from`` of the loop model in force, as text.
-    """
-
+    # value, lower and upper end by ``V1.f_s``, %; empty for an unusable window
     rows: Mapping[str, tuple[float, float, float]]
-    token: str
+    token: str  # ``valid_from`` of the loop model in force, as text
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,35 +80,24 @@ class NodeConfig:
 
 @dataclasses.dataclass(frozen=True)
 class ReplayBag:
-    """A bag, ready to be replayed.
+    """A bag, ready to be replayed."""
 
-    Attributes:
-        name: of the bag.
-        namespace: of the loop's topics.
-        signals: in the order of the bag.
-        estimator, controller: configurations, None when the bag has none.
-        published_fits: messages of ``stiction`` by the end of their window, ns.
-        told_fits: the fits in ``/diagnostics`` by the end of their window, ns.
-        told_gaps: what the monitor told in ``/diagnostics``.
-        models: messages of ``loop_model`` in their order.
-        modes: changes of mode in ``/diagnostics``, the first mode included.
-        counted: a stamp in ns and how many samples the estimator had taken in up to it; None
-            when the bag does not tell.
-        notes: what was left out or stands in the way, one sentence each.
-    """
-
-    name: str
-    namespace: str
-    signals: tuple[Signal, ...]
+    name: str  # of the bag
+    namespace: str  # of the loop's topics
+    signals: tuple[Signal, ...]  # in the order of the bag
+    # estimator, controller: configurations, None when the bag has none
     estimator: NodeConfig | None
     controller: NodeConfig | None
+    # messages of ``stiction`` by the end of their window, ns
     published_fits: Mapping[int, PublishedFit]
-    told_fits: Mapping[int, Fit]
-    told_gaps: GapLog
-    models: tuple[PublishedModel, ...]
-    modes: tuple[ModeChange, ...]
+    told_fits: Mapping[int, Fit]  # the fits in ``/diagnostics`` by the end of their window, ns
+    told_gaps: GapLog  # what the monitor told in ``/diagnostics``
+    models: tuple[PublishedModel, ...]  # messages of ``loop_model`` in their order
+    modes: tuple[ModeChange, ...]  # changes of mode in ``/diagnostics``, the first mode included
+    # a stamp in ns and how many samples the estimator had taken in up to it; None when the bag does
+    # not tell
     counted: tuple[int, int] | None
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what was left out or stands in the way, one sentence each
 
     def stamps(self, kind: str) -> list[int]:
         """Return the stamps of one signal in ascending order, each once, ns."""

@@ -45,17 +45,11 @@ class OpMatch:
 
 @dataclasses.dataclass(frozen=True)
 class ReplayedControl:
-    """What the controller did in the replay.
+    """What the controller did in the replay."""
 
-    Attributes:
-        changes: modes in their order, the one at the start first.
-        op: comparison with the recorded ``op``.
-        notes: why it stopped or left something out.
-    """
-
-    changes: tuple[ModeChange, ...]
-    op: OpMatch
-    notes: tuple[str, ...]
+    changes: tuple[ModeChange, ...]  # modes in their order, the one at the start first
+    op: OpMatch  # comparison with the recorded ``op``
+    notes: tuple[str, ...]  # why it stopped or left something out
 
 
 def replay_controller(

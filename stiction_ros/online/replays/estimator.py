@@ -33,25 +33,15 @@ SECOND = 10**9
 
 @dataclasses.dataclass(frozen=True)
 class ReplayedFit:
-    """One fit of the replay.
+    """One fit of the replay."""
 
-    Attributes:
-        end: last sample of the window, counted from the first sample of the run.
-        stamp: its time, ns.
-        whole: whether the bag holds the whole window; otherwise the recorded fit stands in.
-        update: what the fit says; None when the window was not usable.
-        failure: why it was not usable, or empty.
-        token: ``valid_from`` of the loop model in force after it, as text.
-        model_text: YAML of the loop model that it publishes, or empty.
-    """
-
-    end: int
-    stamp: int
-    whole: bool
-    update: FitUpdate | None
-    failure: str
-    token: str
-    model_text: str
+    end: int  # last sample of the window, counted from the first sample of the run
+    stamp: int  # its time, ns
+    whole: bool  # whether the bag holds the whole window; otherwise the recorded fit stands in
+    update: FitUpdate | None  # what the fit says; None when the window was not usable
+    failure: str  # why it was not usable, or empty
+    token: str  # ``valid_from`` of the loop model in force after it, as text
+    model_text: str  # YAML of the loop model that it publishes, or empty
 
     @property
     def rows(self) -> dict[str, tuple[float, float, float]]:

@@ -18,20 +18,14 @@ from stiction_ros.processes import LinearModel
 
 @dataclasses.dataclass(frozen=True)
 class PlanProblem:
-    """What a plan starts from.
+    """What a plan starts from."""
 
-    Attributes:
-        state: ξ̂, shape (n,).
-        stem: χ_{−1}, shape (m,), %.
-        target: ξ_ss, χ_ss and the outputs there; u_s = χ_ss, the steady OP that leaves
-            the stem at rest in the middle of its band.
-        before: u_{−1}, shape (m,), %; None where OP was at the stem.
-    """
-
-    state: FloatArray
-    stem: FloatArray
+    state: FloatArray  # ξ̂, shape (n,)
+    stem: FloatArray  # χ_{−1}, shape (m,), %
+    # ξ_ss, χ_ss and the outputs there; u_s = χ_ss, the steady OP that leaves the stem at rest in
+    # the middle of its band
     target: Target
-    before: FloatArray | None = None
+    before: FloatArray | None = None  # u_{−1}, shape (m,), %; None where OP was at the stem
 
     @property
     def op_before(self) -> FloatArray:

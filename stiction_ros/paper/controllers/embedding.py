@@ -37,18 +37,12 @@ class Choice(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class PrintedPlan(Plan):
-    """A plan, and what it was chosen from.
+    """A plan, and what it was chosen from."""
 
-    Attributes:
-        choice: the sequence with the lower cost (22) under the hard model (4).
-        programme: how IPOPT ended.
-        iterations: of IPOPT.
-        programme_cost, warm_start_cost: (22) under the hard model; inf where there is none.
-    """
-
-    choice: Choice
-    programme: ProgrammeStatus
-    iterations: int
+    choice: Choice  # the sequence with the lower cost (22) under the hard model (4)
+    programme: ProgrammeStatus  # how IPOPT ended
+    iterations: int  # of IPOPT
+    # programme_cost, warm_start_cost: (22) under the hard model; inf where there is none
     programme_cost: float
     warm_start_cost: float
 

@@ -21,15 +21,10 @@ DWELLS = {1: (1, 2, 4), 2: (1, 3), 3: (2,)}  # samples on the way-point, by stic
 
 @dataclasses.dataclass(frozen=True)
 class Route:
-    """How one sticky valve travels: not at all, at once, or by way of a point beyond.
+    """How one sticky valve travels: not at all, at once, or by way of a point beyond."""
 
-    Attributes:
-        direction: sign of the first move, 0 for staying.
-        dwell: samples on the way-point before the opposite move, 0 for no way-point.
-    """
-
-    direction: int
-    dwell: int = 0
+    direction: int  # sign of the first move, 0 for staying
+    dwell: int = 0  # samples on the way-point before the opposite move, 0 for no way-point
 
 
 class SearchedStart:

@@ -30,19 +30,13 @@ _LIMIT = "Maximum_Iterations_Exceeded"
 
 @dataclasses.dataclass(frozen=True)
 class ProgrammeResult:
-    """What IPOPT found.
+    """What IPOPT found."""
 
-    Attributes:
-        status: how it ended.
-        op: u over the horizon, shape (N, m), %, within the limits; None when failed.
-        cost: (22) under the smoothed model; inf when failed.
-        iterations: number of them.
-    """
-
-    status: ProgrammeStatus
+    status: ProgrammeStatus  # how it ended
+    # u over the horizon, shape (N, m), %, within the limits; None when failed
     op: FloatArray | None
-    cost: float
-    iterations: int
+    cost: float  # (22) under the smoothed model; inf when failed
+    iterations: int  # number of them
 
 
 @dataclasses.dataclass(frozen=True)

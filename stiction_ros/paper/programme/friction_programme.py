@@ -46,25 +46,15 @@ IPOPT = {
 
 @dataclasses.dataclass(frozen=True)
 class Solution:
-    """One end of IPOPT; a failure is a value.
+    """One end of IPOPT; a failure is a value."""
 
-    Attributes:
-        x: scaled unknowns, shape (2m + p (n_a + m n_b + 1),).
-        friction: rows (f_S, f_D), shape (m, 2), %.
-        objective: (12a), squared engineering units.
-        status: IPOPT's own word.
-        iterations: of IPOPT.
-        feasible: whether all constraints hold.
-        stable: whether every identified A(q) has its roots inside the unit circle.
-    """
-
-    x: FloatArray
-    friction: FloatArray
-    objective: float
-    status: str
-    iterations: int
-    feasible: bool
-    stable: bool
+    x: FloatArray  # scaled unknowns, shape (2m + p (n_a + m n_b + 1),)
+    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
+    objective: float  # (12a), squared engineering units
+    status: str  # IPOPT's own word
+    iterations: int  # of IPOPT
+    feasible: bool  # whether all constraints hold
+    stable: bool  # whether every identified A(q) has its roots inside the unit circle
 
     @property
     def accepted(self) -> bool:

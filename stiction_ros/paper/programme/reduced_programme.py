@@ -48,20 +48,14 @@ IPOPT = {
 
 @dataclasses.dataclass(frozen=True)
 class ReducedSolution:
-    """Where one run of IPOPT came to.
+    """Where one run of IPOPT came to."""
 
-    Attributes:
-        friction: rows (f_S, f_D), shape (m, 2), %; the best feasible point evaluated, or the
-            start where none was feasible.
-        objective: V there, squared engineering units; inf where nothing was feasible.
-        status: IPOPT's own word.
-        iterations: of IPOPT.
-    """
-
+    # rows (f_S, f_D), shape (m, 2), %; the best feasible point evaluated, or the start where none
+    # was feasible
     friction: FloatArray
-    objective: float
-    status: str
-    iterations: int
+    objective: float  # V there, squared engineering units; inf where nothing was feasible
+    status: str  # IPOPT's own word
+    iterations: int  # of IPOPT
 
     @property
     def feasible(self) -> bool:

@@ -28,15 +28,10 @@ class StartKind(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Start:
-    """A first guess of the frictions.
+    """A first guess of the frictions."""
 
-    Attributes:
-        kind: where it comes from.
-        friction: rows (f_S, f_D), shape (m, 2), %.
-    """
-
-    kind: StartKind
-    friction: FloatArray
+    kind: StartKind  # where it comes from
+    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
 
 
 def border(limit: float, step: float = STEP) -> FloatArray:

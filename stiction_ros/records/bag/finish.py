@@ -49,23 +49,14 @@ class Packing:
 
 @dataclasses.dataclass(frozen=True)
 class FileContent:
-    """What one storage file holds.
+    """What one storage file holds."""
 
-    Attributes:
-        file: its name, counts and times.
-        topics: in the order they were announced.
-        run: what its metadata records say of the run.
-        finished: whether its writer closed it.
-        damaged: whether something in it is broken.
-        notes: what was left out, one sentence each.
-    """
-
-    file: BagFile
-    topics: tuple[BagTopic, ...]
-    run: Mapping[str, str]
-    finished: bool
-    damaged: bool
-    notes: tuple[str, ...]
+    file: BagFile  # its name, counts and times
+    topics: tuple[BagTopic, ...]  # in the order they were announced
+    run: Mapping[str, str]  # what its metadata records say of the run
+    finished: bool  # whether its writer closed it
+    damaged: bool  # whether something in it is broken
+    notes: tuple[str, ...]  # what was left out, one sentence each
 
 
 def storage_path(directory: Path, number: int = 0) -> Path:

@@ -25,21 +25,13 @@ Wanted = Callable[[BagTopic], bool]
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class BagMessage:
-    """One decoded message.
+    """One decoded message."""
 
-    Attributes:
-        topic: full topic name.
-        type: ``sensor_msgs/msg/JointState``.
-        log_time: when it was received, ns.
-        publish_time: when it was sent, ns.
-        message: its fields as attributes.
-    """
-
-    topic: str
-    type: str
-    log_time: int
-    publish_time: int
-    message: Any
+    topic: str  # full topic name
+    type: str  # ``sensor_msgs/msg/JointState``
+    log_time: int  # when it was received, ns
+    publish_time: int  # when it was sent, ns
+    message: Any  # its fields as attributes
 
 
 def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMessage]:

@@ -27,20 +27,13 @@ _NUMBERED = {
 
 @dataclasses.dataclass(frozen=True)
 class BagContent:
-    """What there is to play in a bag.
+    """What there is to play in a bag."""
 
-    Attributes:
-        messages: in the order of the bag.
-        topics: by name.
-        first, last: least and largest log time, ns.
-        notes: what was left out while reading, one sentence each.
-    """
-
-    messages: Sequence[RawMessage]
-    topics: Mapping[str, BagTopic]
-    first: int
+    messages: Sequence[RawMessage]  # in the order of the bag
+    topics: Mapping[str, BagTopic]  # by name
+    first: int  # first, last: least and largest log time, ns
     last: int
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what was left out while reading, one sentence each
 
     @property
     def seconds(self) -> float:

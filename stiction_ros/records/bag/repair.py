@@ -34,23 +34,15 @@ class RepairStatus(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Repair:
-    """What a repair found and did.
+    """What a repair found and did."""
 
-    Attributes:
-        status: ``whole``: nothing was wrong; ``finished``: files that their writer had not
-            closed were finished, or ``metadata.yaml`` was made anew; ``salvaged``: damaged
-            records were left out.
-        files: names of the storage files, in order.
-        rewritten: those that were rewritten.
-        messages: messages by topic in the bag as it is now.
-        notes: what was wrong, one sentence each.
-    """
-
+    # ``whole``: nothing was wrong; ``finished``: files that their writer had not closed were
+    # finished, or ``metadata.yaml`` was made anew; ``salvaged``: damaged records were left out
     status: RepairStatus
-    files: tuple[str, ...]
-    rewritten: tuple[str, ...]
-    messages: dict[str, int]
-    notes: tuple[str, ...]
+    files: tuple[str, ...]  # names of the storage files, in order
+    rewritten: tuple[str, ...]  # those that were rewritten
+    messages: dict[str, int]  # messages by topic in the bag as it is now
+    notes: tuple[str, ...]  # what was wrong, one sentence each
 
 
 def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noqa: B008 (frozen)

@@ -31,15 +31,10 @@ __all__ = ["BagWriter", "Packing", "Qos", "Splitting"]
 
 @dataclasses.dataclass(frozen=True)
 class Splitting:
-    """When a bag goes on in its next file; 0 for never.
+    """When a bag goes on in its next file; 0 for never."""
 
-    Attributes:
-        size: bytes of messages in one file, before compression.
-        duration: log time in one file, ns.
-    """
-
-    size: int = 0
-    duration: int = 0
+    size: int = 0  # bytes of messages in one file, before compression
+    duration: int = 0  # log time in one file, ns
 
 
 class _Entry:

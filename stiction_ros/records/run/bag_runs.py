@@ -25,18 +25,13 @@ NEAR = 30  # messages of all signals between a sample and another signal's messa
 
 @dataclasses.dataclass
 class Run:
-    """Messages of one run.
+    """Messages of one run."""
 
-    Attributes:
-        place: stamp in ns to the message's number in the log; the first one of each stamp.
-        begin, end: numbers of its first and last message in the log.
-        first, last: smallest and largest stamp, ns.
-    """
-
+    # stamp in ns to the message's number in the log; the first one of each stamp
     place: dict[int, int]
-    begin: int
+    begin: int  # begin, end: numbers of its first and last message in the log
     end: int
-    first: int
+    first: int  # first, last: smallest and largest stamp, ns
     last: int
 
     @classmethod
@@ -57,17 +52,11 @@ class Run:
 
 @dataclasses.dataclass(frozen=True)
 class Told:
-    """What the stamps of a signal tell.
+    """What the stamps of a signal tell."""
 
-    Attributes:
-        runs: in the order in which they begin.
-        strays: stretches too short for a run, in the same order.
-        lost: messages in no run.
-    """
-
-    runs: tuple[Run, ...]
-    strays: tuple[Run, ...]
-    lost: int
+    runs: tuple[Run, ...]  # in the order in which they begin
+    strays: tuple[Run, ...]  # stretches too short for a run, in the same order
+    lost: int  # messages in no run
 
 
 def tell_runs(stamps: Sequence[int], numbers: Sequence[int]) -> Told:

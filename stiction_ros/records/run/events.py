@@ -28,55 +28,34 @@ FIGURES = ("p50", "p99", "p999", "max")
 
 @dataclasses.dataclass(frozen=True)
 class Estimate:
-    """One parameter of one fit.
+    """One parameter of one fit."""
 
-    Attributes:
-        stamp: end of the window, ns.
-        name: ``V1.f_s``.
-        value: estimate, % of travel for friction.
-        low: lower end of its interval, NaN when not given.
-        high: upper end of its interval, NaN when not given.
-    """
-
-    stamp: int
-    name: str
-    value: float
-    low: float
-    high: float
+    stamp: int  # end of the window, ns
+    name: str  # ``V1.f_s``
+    value: float  # estimate, % of travel for friction
+    low: float  # lower end of its interval, NaN when not given
+    high: float  # upper end of its interval, NaN when not given
 
 
 @dataclasses.dataclass(frozen=True)
 class ModeChange:
-    """The controller's mode from a moment on.
+    """The controller's mode from a moment on."""
 
-    Attributes:
-        stamp: of the first ``op`` of the new mode, ns.
-        mode: ``unaware``, ``embedding``, ``inversion`` or ``hold``.
-        model: of the valves that it works with, as the controller names it.
-        reason: why it changed.
-        frictions: what it takes for the friction of its valves, by ``V1.f_s``, %.
-    """
-
-    stamp: int
-    mode: str
-    model: str = ""
-    reason: str = ""
+    stamp: int  # of the first ``op`` of the new mode, ns
+    mode: str  # ``unaware``, ``embedding``, ``inversion`` or ``hold``
+    model: str = ""  # of the valves that it works with, as the controller names it
+    reason: str = ""  # why it changed
+    # what it takes for the friction of its valves, by ``V1.f_s``, %
     frictions: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)
 class Fit:
-    """One fit of the estimator.
+    """One fit of the estimator."""
 
-    Attributes:
-        stamp: end of the window, ns.
-        identification: the mapping of ``identify --json`` without ``record``.
-        trusted: friction trusted after this fit, by ``V1.f_s``, %.
-    """
-
-    stamp: int
-    identification: Mapping[str, Any]
-    trusted: Mapping[str, float]
+    stamp: int  # end of the window, ns
+    identification: Mapping[str, Any]  # the mapping of ``identify --json`` without ``record``
+    trusted: Mapping[str, float]  # friction trusted after this fit, by ``V1.f_s``, %
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,15 +69,10 @@ class Text:
 
 @dataclasses.dataclass(frozen=True)
 class GapLog:
-    """What the monitor told, by the end of its window in ns.
+    """What the monitor told, by the end of its window in ns."""
 
-    Attributes:
-        looks: documents of the measurements.
-        findings: documents of what the workflow found.
-    """
-
-    looks: Mapping[int, Mapping[str, Any]]
-    findings: Mapping[int, Mapping[str, Any]]
+    looks: Mapping[int, Mapping[str, Any]]  # documents of the measurements
+    findings: Mapping[int, Mapping[str, Any]]  # documents of what the workflow found
 
 
 class _Status(NamedTuple):

@@ -38,41 +38,27 @@ from stiction_ros.records.run.loop_signals import LoopSignals, is_signal
 
 @dataclasses.dataclass(frozen=True)
 class RunLog:
-    """A run of the live loop as its bag tells it.
+    """A run of the live loop as its bag tells it."""
 
-    Attributes:
-        record: the loop's signals, one segment; where some are missing stand bad samples.
-        start: stamp of the record's first sample, ns.
-        estimates: in the order they came.
-        modes: every change of mode, model or friction, the mode at the start first.
-        loop_models: the YAML texts on ``loop_model``.
-        configs: what the nodes published on ``~/config``.
-        clock: the simulated times on ``/clock``, ns.
-        recorded: messages in the bag by topic.
-        published: messages by topic as the nodes counted them in ``/diagnostics``.
-        notes: what was left out while reading, one sentence each.
-        fits: in the order of their windows.
-        stem_estimate: the controller's estimate of the stem positions at the record's
-            samples, shape (N, m), %, NaN where none was published; None when there is none.
-        gaps: what the monitor told.
-        pv_to_op_ms: p50, p99, p999 and max of the times from PV to OP; empty in lockstep.
-        wall_seconds: from the first to the last publication, on the publishers' clock.
-    """
-
-    record: Record
-    start: int
-    estimates: tuple[Estimate, ...]
+    record: Record  # the loop's signals, one segment; where some are missing stand bad samples
+    start: int  # stamp of the record's first sample, ns
+    estimates: tuple[Estimate, ...]  # in the order they came
+    # every change of mode, model or friction, the mode at the start first
     modes: tuple[ModeChange, ...]
-    loop_models: tuple[Text, ...]
-    configs: tuple[Text, ...]
-    clock: tuple[int, ...]
-    recorded: Mapping[str, int]
-    published: Mapping[str, int]
-    notes: tuple[str, ...] = ()
-    fits: tuple[Fit, ...] = ()
+    loop_models: tuple[Text, ...]  # the YAML texts on ``loop_model``
+    configs: tuple[Text, ...]  # what the nodes published on ``~/config``
+    clock: tuple[int, ...]  # the simulated times on ``/clock``, ns
+    recorded: Mapping[str, int]  # messages in the bag by topic
+    published: Mapping[str, int]  # messages by topic as the nodes counted them in ``/diagnostics``
+    notes: tuple[str, ...] = ()  # what was left out while reading, one sentence each
+    fits: tuple[Fit, ...] = ()  # in the order of their windows
+    # the controller's estimate of the stem positions at the record's samples, shape (N, m), %, NaN
+    # where none was published; None when there is none
     stem_estimate: FloatArray | None = None
+    # from the first to the last publication, on the publishers' clock
     wall_seconds: float = float("nan")
-    gaps: GapLog = GapLog({}, {})
+    gaps: GapLog = GapLog({}, {})  # what the monitor told
+    # p50, p99, p999 and max of the times from PV to OP; empty in lockstep
     pv_to_op_ms: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def seconds(self, stamp: int) -> float:

@@ -22,18 +22,12 @@ MOST_HELD = 0.01  # share of the samples at which a missing stem is held
 
 @dataclasses.dataclass(frozen=True)
 class LoopRun:
-    """One run of a loop.
+    """One run of a loop."""
 
-    Attributes:
-        begin, end: numbers of its first and last message of ``pv`` in the log.
-        start: stamp of its first sample, ns.
-        parts: its records without a gap, in order of time.
-    """
-
-    begin: int
+    begin: int  # begin, end: numbers of its first and last message of ``pv`` in the log
     end: int
-    start: int
-    parts: tuple[Record, ...]
+    start: int  # stamp of its first sample, ns
+    parts: tuple[Record, ...]  # its records without a gap, in order of time
 
     def __len__(self) -> int:
         return sum(len(part) for part in self.parts)

@@ -15,17 +15,11 @@ SIGNALS = ("pv", "sp", "op", "op_applied", "stem")
 
 
 class Given(NamedTuple):
-    """One usable message of a signal.
+    """One usable message of a signal."""
 
-    Attributes:
-        number: its place in the log.
-        stamp: ns.
-        values: tag to value.
-    """
-
-    number: int
-    stamp: int
-    values: dict[str, float]
+    number: int  # its place in the log
+    stamp: int  # ns
+    values: dict[str, float]  # tag to value
 
 
 def is_signal(topic: BagTopic) -> bool:

@@ -51,18 +51,13 @@ class PhaseStatus(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Score:
-    """How one output behaved during one phase, in its engineering units.
+    """How one output behaved during one phase, in its engineering units."""
 
-    Attributes:
-        amplitude: of the spectral line at the dominant period; None when no hold is long
-            enough to measure it or there is no period.
-        offset: |mean error| at the end of the holds.
-        iae_per_hour: mean |error| less the share of known noise, PV units × h per h.
-    """
-
+    # of the spectral line at the dominant period; None when no hold is long enough to measure it or
+    # there is no period
     amplitude: float | None
-    offset: float
-    iae_per_hour: float
+    offset: float  # |mean error| at the end of the holds
+    iae_per_hour: float  # mean |error| less the share of known noise, PV units × h per h
 
     def to_dict(self) -> dict[str, float | None]:
         """Return the mapping of ``summary.json``."""
@@ -71,37 +66,23 @@ class Score:
 
 @dataclasses.dataclass(frozen=True)
 class Phase:
-    """A stretch of samples, and what it is measured by.
+    """A stretch of samples, and what it is measured by."""
 
-    Attributes:
-        first, last: its samples, the last one not included.
-        scores: by output.
-        work: of each valve per hour; empty where the stems are unknown.
-        op_step: largest move of each OP from one sample to the next, by valve, %.
-    """
-
-    first: int
+    first: int  # first, last: its samples, the last one not included
     last: int
-    scores: Mapping[str, Score]
-    work: Mapping[str, ValveWork]
-    op_step: Mapping[str, float]
+    scores: Mapping[str, Score]  # by output
+    work: Mapping[str, ValveWork]  # of each valve per hour; empty where the stems are unknown
+    op_step: Mapping[str, float]  # largest move of each OP from one sample to the next, by valve, %
 
 
 @dataclasses.dataclass(frozen=True)
 class Phases:
-    """The rounds of the schedule before and after the swap, scored alike.
+    """The rounds of the schedule before and after the swap, scored alike."""
 
-    Attributes:
-        status: ok, or why the two cannot be compared.
-        reason: one sentence; empty when ok.
-        cycle: of ``before``, None when it could not be looked for.
-        before, after: None where there is no whole round.
-    """
-
-    status: PhaseStatus
-    reason: str
-    cycle: Cycle | None
-    before: Phase | None
+    status: PhaseStatus  # ok, or why the two cannot be compared
+    reason: str  # one sentence; empty when ok
+    cycle: Cycle | None  # of ``before``, None when it could not be looked for
+    before: Phase | None  # before, after: None where there is no whole round
     after: Phase | None
 
 

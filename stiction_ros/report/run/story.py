@@ -22,29 +22,18 @@ TANK_UNITS = {"C": "kg/m³", "T": "°C"}
 
 @dataclasses.dataclass(frozen=True)
 class Story:
-    """A run of the live loop, ready to be told.
+    """A run of the live loop, ready to be told."""
 
-    Attributes:
-        name: of the scenario or the bag.
-        log: what the bag holds.
-        phases: before and after the swap.
-        stiction_free: the same moves with ideal valves, None when not simulated.
-        free_record: record of that run.
-        truth: the loop that the plant node simulated; None for a real plant.
-        seed: of the plant's noise, None when unknown.
-        round_samples: samples of one round of the set-points, None when they do not repeat.
-        units: engineering unit of each PV where known.
-    """
-
-    name: str
-    log: RunLog
-    phases: Phases
-    stiction_free: Phase | None
-    free_record: Record | None
-    truth: LoopModel | None
-    seed: int | None
+    name: str  # of the scenario or the bag
+    log: RunLog  # what the bag holds
+    phases: Phases  # before and after the swap
+    stiction_free: Phase | None  # the same moves with ideal valves, None when not simulated
+    free_record: Record | None  # record of that run
+    truth: LoopModel | None  # the loop that the plant node simulated; None for a real plant
+    seed: int | None  # of the plant's noise, None when unknown
+    # samples of one round of the set-points, None when they do not repeat
     round_samples: int | None
-    units: Mapping[str, str]
+    units: Mapping[str, str]  # engineering unit of each PV where known
 
     @property
     def record(self) -> Record:

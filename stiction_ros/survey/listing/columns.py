@@ -65,20 +65,13 @@ Cell = tuple[str, object]  # HTML, and what it is sorted by; None stands last
 
 @dataclasses.dataclass(frozen=True)
 class Columns:
-    """Which columns a list has.
+    """Which columns a list has."""
 
-    Attributes:
-        costs, gains: whether a loop has one.
-        trends: of the loops that an earlier survey has, by name.
-        earlier: whether there was an earlier survey.
-        widest: end of the scale of the trends by unit of OP.
-    """
-
-    costs: bool
+    costs: bool  # costs, gains: whether a loop has one
     gains: bool
-    trends: Mapping[str, Trend]
-    earlier: bool
-    widest: Mapping[str, float]
+    trends: Mapping[str, Trend]  # of the loops that an earlier survey has, by name
+    earlier: bool  # whether there was an earlier survey
+    widest: Mapping[str, float]  # end of the scale of the trends by unit of OP
 
     @classmethod
     def of(cls, entries: Sequence[Entry], earlier: Sequence[Earlier]) -> Columns:
