@@ -33,13 +33,7 @@ from stiction_ros.texts import symbol
 if TYPE_CHECKING:
     from stiction_ros.discrepancy import Discrepancy
 
-EXIT_CODES = {
-    "named": 0,
-    "none": 0,
-    "ambiguous": 3,
-    "unknown": 4,
-    "untestable": 5,
-}
+EXIT_CODES = {"named": 0, "none": 0, "ambiguous": 3, "unknown": 4, "untestable": 5}
 
 
 def add(commands: Any) -> None:

@@ -22,8 +22,7 @@ from stiction_ros.records.parts import longest_part
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        "report",
-        description="Make a self-contained HTML report of a bag, or of a CSV record.",
+        "report", description="Make a self-contained HTML report of a bag, or of a CSV record."
     )
     parser.add_argument("record", metavar="BAG_OR_RECORD", help="bag or CSV file")
     add_columns(parser)

@@ -52,14 +52,10 @@ def add(commands: Any) -> None:
     add_law(parser)
     parser.add_argument("--no-gain", action="store_true", help="do not simulate what would help")
     parser.add_argument(
-        "--cost",
-        metavar="F",
-        help="CSV with columns loop,cost: money per hour and unit of |PV−SP|",
+        "--cost", metavar="F", help="CSV with columns loop,cost: money per hour and unit of |PV−SP|"
     )
     parser.add_argument(
-        "--units",
-        metavar="F",
-        help="CSV with columns loop,unit: the unit of PV on the pages",
+        "--units", metavar="F", help="CSV with columns loop,unit: the unit of PV on the pages"
     )
     parser.add_argument(
         "--previous",

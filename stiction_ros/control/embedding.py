@@ -9,23 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.control.beliefs import ValveBeliefs
-from stiction_ros.control.certificate import (
-    Certificate,
-    CertificateStatus,
-    FreeJumps,
-    certify,
-)
-from stiction_ros.control.embedding_problem import (
-    EmbeddingProblem,
-    JumpPattern,
-    StickyState,
-)
+from stiction_ros.control.certificate import Certificate, CertificateStatus, FreeJumps, certify
+from stiction_ros.control.embedding_problem import EmbeddingProblem, JumpPattern, StickyState
 from stiction_ros.control.formulation import Formulation
-from stiction_ros.control.horizon import (
-    HorizonCost,
-    HorizonLimits,
-    HorizonWeights,
-)
+from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonWeights
 from stiction_ros.control.horizon_qp import HorizonSolution
 from stiction_ros.control.jump_form import FrictionSpread, JumpForm, jump_form
 from stiction_ros.control.pattern_bounds import PatternBounds

@@ -6,10 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.control.horizon import (
-    HorizonCost,
-    HorizonLimits,
-)
+from stiction_ros.control.horizon import HorizonCost, HorizonLimits
 from stiction_ros.control.horizon_qp import HorizonQp, HorizonSolution, SharedTerms
 from stiction_ros.control.target import Target
 from stiction_ros.effects.behaviour import FloatArray
@@ -52,10 +49,7 @@ class EmbeddingProblem:
     """
 
     def __init__(
-        self,
-        cost: HorizonCost,
-        limits: HorizonLimits,
-        combination: tuple[JumpPattern | None, ...],
+        self, cost: HorizonCost, limits: HorizonLimits, combination: tuple[JumpPattern | None, ...]
     ) -> None:
         """Factorise for ``combination``, one pattern per valve, None for a healthy one."""
         self.combination = combination

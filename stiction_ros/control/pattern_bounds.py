@@ -33,9 +33,7 @@ class PatternBounds:
 
         The loops are compiled here, so that no control step waits for it.
         """
-        from stiction_ros.control.box_bounds import (
-            box_bounds,  # compiled: slow to import
-        )
+        from stiction_ros.control.box_bounds import box_bounds  # compiled: slow to import
 
         width, horizon = len(combinations[0]), cost.horizon
         healthy = np.array([pattern is None for pattern in combinations[0]])

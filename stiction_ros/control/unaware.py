@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.control.formulation import Formulation
-from stiction_ros.control.horizon import (
-    HorizonCost,
-    HorizonLimits,
-    HorizonWeights,
-)
+from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonWeights
 from stiction_ros.control.horizon_qp import HorizonQp, HorizonSolution
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.control.target import Target

@@ -180,11 +180,7 @@ def he_stems(
 
 @compiled
 def semi_physical_stems(
-    static: FloatArray,
-    dynamic: FloatArray,
-    overshoot: FloatArray,
-    u: FloatArray,
-    start: FloatArray,
+    static: FloatArray, dynamic: FloatArray, overshoot: FloatArray, u: FloatArray, start: FloatArray
 ) -> FloatArray:
     """Return stems, shape (N, G), of valves (f_S, f_D, K) that rest at ``start``, (G,)."""
     count, size = len(u), len(static)

@@ -24,8 +24,7 @@ class OpUnit(enum.StrEnum):
     VOLT_10 = "0-10v"
     VOLT_1_5 = "1-5v"
     VOLT_2_10 = "2-10v"
-    OTHER = "other"
-    """Anything else; OP is taken as it is."""
+    OTHER = "other"  # anything else; OP is taken as it is
 
 
 LETTERS = {"op": "V", "pv": "PV", "sp": "PV", "stem": "V"}
@@ -43,8 +42,7 @@ _OP_UNITS = {word: OpUnit(unit) for word, unit in by_word("op_units").items()}
 class TimeUnit(enum.StrEnum):
     """What a time that is a number is counted in."""
 
-    DAYS = "days"
-    """Since the last day of 1899, as spreadsheets count, when they are that many."""
+    DAYS = "days"  # since the last day of 1899, as spreadsheets count, when they are that many
     HOURS = "h"
     MINUTES = "min"
     SECONDS = "s"

@@ -111,11 +111,7 @@ def _in_lanes(values: FloatArray, first: int, by_lane: FloatArray) -> None:
 
 @compiled
 def run_loops(
-    process: Process,
-    controllers: Controllers,
-    runs: Runs,
-    sp: FloatArray,
-    load: FloatArray,
+    process: Process, controllers: Controllers, runs: Runs, sp: FloatArray, load: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return OP, shape (R, n, m), and PV, shape (R, n, p).
 

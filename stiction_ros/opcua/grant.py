@@ -11,14 +11,10 @@ FOREIGN = "another one lets the heartbeat rise"
 class GrantState(enum.Enum):
     """Where the handshake stands."""
 
-    LISTENING = "listening"
-    """Nothing is ever written."""
-    IDLE = "idle"
-    """Nothing is asked for; the plant's own controller has the valves."""
-    ASKED = "asked"
-    """Remote operation is asked for; the mode does not grant it yet."""
-    GRANTED = "granted"
-    """The mode of each valve grants it; OP is written."""
+    LISTENING = "listening"  # nothing is ever written
+    IDLE = "idle"  # nothing is asked for; the plant's own controller has the valves
+    ASKED = "asked"  # remote operation is asked for; the mode does not grant it yet
+    GRANTED = "granted"  # the mode of each valve grants it; OP is written
 
 
 @dataclasses.dataclass(frozen=True)

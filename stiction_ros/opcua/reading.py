@@ -14,11 +14,9 @@ class TagQuality(enum.IntEnum):
     """How good a value is, the best first; the number stands in ``effort`` of ``pv``."""
 
     GOOD = 0
-    UNCERTAIN = 1
-    """Such as a last usable value, or one put in by hand."""
+    UNCERTAIN = 1  # such as a last usable value, or one put in by hand
     BAD = 2
-    SILENT = 3
-    """Nothing is heard of the server, or nothing was ever heard of the tag."""
+    SILENT = 3  # nothing is heard of the server, or nothing was ever heard of the tag
 
 
 @dataclasses.dataclass(frozen=True, slots=True)

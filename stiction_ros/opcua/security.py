@@ -179,9 +179,7 @@ def make_certificate(identity: Identity, certificate: Path, private_key: Path) -
         .sign(key, hashes.SHA256())
     )
     pem = key.private_bytes(
-        serialization.Encoding.PEM,
-        serialization.PrivateFormat.PKCS8,
-        serialization.NoEncryption(),
+        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
     )
     write_secret(private_key, pem)
     certificate.write_bytes(made.public_bytes(serialization.Encoding.DER))

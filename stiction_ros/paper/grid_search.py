@@ -63,9 +63,7 @@ def count_points(record: Record, options: PaperOptions) -> int:
 
 
 def identify_by_grid(
-    record: Record,
-    options: PaperOptions | None = None,
-    progress: Progress | None = None,
+    record: Record, options: PaperOptions | None = None, progress: Progress | None = None
 ) -> PaperIdentification:
     """Identify by the grid search; the options have its ``grid_step`` and ``grid_law``.
 

@@ -37,11 +37,7 @@ def _by_grid(
     return identify_by_grid(record, options, progress)
 
 
-METHODS: Mapping[str, Method] = {
-    "nlp": _by_programme,
-    "nlp_printed": _as_printed,
-    "grid": _by_grid,
-}
+METHODS: Mapping[str, Method] = {"nlp": _by_programme, "nlp_printed": _as_printed, "grid": _by_grid}
 
 
 def identify(

@@ -15,12 +15,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.effects import (
-    HeStiction,
-    KanoStiction,
-    SemiPhysicalStiction,
-    XchStiction,
-)
+from stiction_ros.effects import HeStiction, KanoStiction, SemiPhysicalStiction, XchStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.friction.he_smoothed import smoothed_step
 from stiction_ros.effects.friction.kano_smoothed import REST, kano_step

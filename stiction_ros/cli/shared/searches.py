@@ -133,9 +133,7 @@ def search_options(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def identify_by(
-    method: str,
-    options: IdentificationOptions,
-    chosen: dict[str, Any],
+    method: str, options: IdentificationOptions, chosen: dict[str, Any]
 ) -> Callable[[Record, Callable[[float], None]], Identification]:
     """Return what identifies a record by one of :data:`METHODS`, as ``chosen``."""
     if method in PAPER_METHODS:

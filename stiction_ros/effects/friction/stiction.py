@@ -134,10 +134,7 @@ class Stiction(Behaviour):
     # keys of further parameters that stay at their defaults, which is said: constants of the law.
     # All others are identified
     held: ClassVar[tuple[str, ...]] = ()
-    told_of_step: ClassVar[tuple[str, ...]] = (
-        *Behaviour.told_of_step,
-        *("switching", "jump_form"),
-    )
+    told_of_step: ClassVar[tuple[str, ...]] = (*Behaviour.told_of_step, *("switching", "jump_form"))
 
     def jump_form(self) -> JumpForm | None:
         """Return the moves that it can make when OP rests between them; None for no form."""

@@ -163,11 +163,7 @@ def _own_times(
 
 
 def _refuse_missing(
-    sheet: Sheet,
-    op: Iterable[str],
-    pv: Iterable[str],
-    options: IntakeOptions,
-    top: Sequence[Cells],
+    sheet: Sheet, op: Iterable[str], pv: Iterable[str], options: IntakeOptions, top: Sequence[Cells]
 ) -> None:
     """Raise where several of OP, PV and the time are missing, with all that is to be said."""
     wanted = [("op", name) for name in op] + [("pv", name) for name in pv]

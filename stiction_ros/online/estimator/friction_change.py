@@ -265,11 +265,7 @@ def _grid(static: float, dynamic: float, shares: FloatArray) -> FloatArray:
 
 
 def _changed(
-    rule: ChangeRule,
-    evidence: Evidence,
-    valve: int,
-    found: _Found,
-    trusted: TrustedFriction,
+    rule: ChangeRule, evidence: Evidence, valve: int, found: _Found, trusted: TrustedFriction
 ) -> FrictionChange | None:
     """Return the change to ``found``, its f_D refined; None where it does not stand up."""
     first = found.first

@@ -12,12 +12,7 @@ import numpy as np
 from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.identification import (
-    Identification,
-    IdentificationOptions,
-    OutputModel,
-    identify,
-)
+from stiction_ros.identification import Identification, IdentificationOptions, OutputModel, identify
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import AUTO
 from stiction_ros.loop import LoopModel

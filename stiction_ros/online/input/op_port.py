@@ -17,10 +17,8 @@ class Reception(enum.Enum):
     """What became of one OP."""
 
     TAKEN = "taken"
-    LATE = "late"
-    """Taken, though its sample had passed."""
-    REPEATED = "repeated"
-    """Not newer than the last one taken: the first OP of a sample wins."""
+    LATE = "late"  # taken, though its sample had passed
+    REPEATED = "repeated"  # not newer than the last one taken: the first OP of a sample wins
     NAME = "name"
     TAGS = "tags"
     NUMBER = "number"

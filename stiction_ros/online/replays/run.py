@@ -12,12 +12,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
 from stiction_ros.online.replays.bag import NodeConfig, ReplayBag, read_replay_bag
-from stiction_ros.online.replays.controller import (
-    SECOND,
-    Offer,
-    ReplayedControl,
-    replay_controller,
-)
+from stiction_ros.online.replays.controller import SECOND, Offer, ReplayedControl, replay_controller
 from stiction_ros.online.replays.estimator import ReplayedEstimator
 from stiction_ros.online.replays.matching import match_fit, match_modes, trust_is_known
 from stiction_ros.online.replays.monitor import match_monitor

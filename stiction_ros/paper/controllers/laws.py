@@ -17,9 +17,7 @@ from stiction_ros.errors import InputError
 PrintedFriction = HeStiction | KanoStiction | XchStiction
 
 
-def printed_frictions(
-    frictions: Sequence[Behaviour | None],
-) -> tuple[PrintedFriction | None, ...]:
+def printed_frictions(frictions: Sequence[Behaviour | None]) -> tuple[PrintedFriction | None, ...]:
     """Return ``frictions`` when the paper's controllers can take all of them; else InputError."""
     known: list[PrintedFriction | None] = []
     for friction in frictions:

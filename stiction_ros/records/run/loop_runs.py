@@ -71,8 +71,7 @@ def loop_runs(
         note = f"{len(refused)} runs left out: {refused[0].what}"
         found = [
             dataclasses.replace(
-                run,
-                parts=tuple(dataclasses.replace(p, notes=(*p.notes, note)) for p in run.parts),
+                run, parts=tuple(dataclasses.replace(p, notes=(*p.notes, note)) for p in run.parts)
             )
             for run in found
         ]

@@ -120,10 +120,7 @@ def joined(files: Sequence[BagFile]) -> BagFile:
 
 
 def bag_information(
-    files: Sequence[BagFile],
-    topics: Sequence[BagTopic],
-    *,
-    custom: Mapping[str, str] | None = None,
+    files: Sequence[BagFile], topics: Sequence[BagTopic], *, custom: Mapping[str, str] | None = None
 ) -> dict[str, Any]:
     """Return the mapping ``rosbag2_bagfile_information`` of a bag.
 

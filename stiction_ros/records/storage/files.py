@@ -136,9 +136,7 @@ def _refuse_foreign(information: Mapping[str, Any], directory: Path) -> None:
         raise InputError(f"has version {version}, newer than {VERSION}", where=str(where))
     if storage != "mcap" or mode.lower() == "message":
         raise InputError(
-            f"the storage is {storage} {mode}".strip(),
-            where=str(where),
-            fix=conversion(directory),
+            f"the storage is {storage} {mode}".strip(), where=str(where), fix=conversion(directory)
         )
 
 

@@ -23,10 +23,7 @@ from stiction_ros.texts import finite, probability
 
 
 def report_record(
-    record: Record,
-    identification: Identification,
-    out: str | Path,
-    parts: Sequence[Record] = (),
+    record: Record, identification: Identification, out: str | Path, parts: Sequence[Record] = ()
 ) -> Path:
     """Write the page of a record and return its file.
 

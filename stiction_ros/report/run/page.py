@@ -5,16 +5,7 @@ from __future__ import annotations
 from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.events import ModeChange
-from stiction_ros.report.page import (
-    Cell,
-    count,
-    duration,
-    folded,
-    interval,
-    number,
-    percent,
-    table,
-)
+from stiction_ros.report.page import Cell, count, duration, folded, interval, number, percent, table
 from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.identified import (
     KINDS,

@@ -43,10 +43,7 @@ def same_imports() -> Iterator[None]:
     ``multiprocessing`` tells that to a worker, but not to the server that workers are forked from.
     """
     here = os.getcwd()
-    told = {
-        "PYTHONPATH": os.pathsep.join(path or here for path in sys.path),
-        "PYTHONSAFEPATH": "1",
-    }
+    told = {"PYTHONPATH": os.pathsep.join(path or here for path in sys.path), "PYTHONSAFEPATH": "1"}
     before = {name: os.environ.get(name) for name in told}
     os.environ.update(told)
     try:
