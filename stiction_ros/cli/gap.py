@@ -157,7 +157,7 @@ def _print(found: Discrepancy) -> None:
                     f"{value:.5g} {effect.units.get(key, '')}".removesuffix(" 1").rstrip(),
                     "" if ends is None else f"{ends[0]:.5g} to {ends[1]:.5g}",
                     f"{effect.delta_bic:.0f}" if k == 0 else "",
-                    _share(effect.closed) if k == 0 else "",
+                    "" if k or math.isnan(effect.closed) else f"{100.0 * effect.closed:.0f} %",
                 )
         console.print(table)
     elif found.alternatives:
@@ -187,10 +187,6 @@ def _print(found: Discrepancy) -> None:
             console.print(f"not considered: {', '.join(sorted(left))}: {reason}", markup=False)
     for note in found.notes:
         console.print(f"note: {note}", markup=False)
-
-
-def _share(closed: float) -> str:
-    return "" if math.isnan(closed) else f"{100.0 * closed:.0f} %"
 
 
 def _gaps(found: Discrepancy) -> Table:

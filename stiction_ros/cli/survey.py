@@ -146,13 +146,8 @@ def run(options: argparse.Namespace) -> int:
     if plan.out is not None:
         list_at = f"list: {plan.out / PAGE}"
     print(list_at, file=sys.stderr)
-    return _code(found)
-
-
-def _code(found: Any) -> int:
-    """Return the exit code: 1 where every loop failed."""
-    failed = sum(entry.status.value == "failed" for entry in found.entries)
-    return 1 if failed and failed == len(found.entries) else 0
+    statuses = {entry.status.value for entry in found.entries}
+    return 1 if statuses == {"failed"} else 0
 
 
 def _engine(options: argparse.Namespace) -> Any:

@@ -120,7 +120,7 @@ class EmbeddingMpc(Formulation):
         combinations = tuple(
             combination
             for combination in itertools.product(*choices)
-            if _fits(combination, weights.horizon)
+            if all(p is None or p.wait + p.second < weights.horizon for p in combination)
         )
         self._problems = tuple(EmbeddingProblem(self.cost, limits, one) for one in combinations)
         self._jumps = np.array([problem.jumps for problem in self._problems], dtype=float)
@@ -251,7 +251,3 @@ class EmbeddingMpc(Formulation):
             if form is not None and abs(stem[j] - last[j]) > 0.5 * self._least[j]:
                 op[j] = form.op(float(last[j]), float(stem[j]))
         return np.asarray(np.clip(op, self.limits.stem[:, 0], self.limits.stem[:, 1]))
-
-
-def _fits(combination: tuple[JumpPattern | None, ...], horizon: int) -> bool:
-    return all(p is None or p.wait + p.second < horizon for p in combination)

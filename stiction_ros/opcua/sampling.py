@@ -140,7 +140,9 @@ class LoopSampler:
         present = self._clock.now(now)
         found: list[PlantSample] = []
         while self._next is not None and present is not None:
-            ready = alive and self._fresh(self._next - self._jitter)
+            ready = alive and all(
+                self.latest(tag).stamp >= self._next - self._jitter for tag in self._pv
+            )
             if not ready and present < self._next + self.tags.sample_ns // SETTLE:
                 break
             if ready and present > self._next + LOST * self.tags.sample_ns:
@@ -231,10 +233,6 @@ class LoopSampler:
         self._next += lost * self.tags.sample_ns
 
     # ---- samples ---------------------------------------------------------------------------
-
-    def _fresh(self, since: int) -> bool:
-        """Return whether each PV has a stamp at or after ``since``."""
-        return all(self.latest(tag).stamp >= since for tag in self._pv)
 
     def _close(self, stamp: int, alive: bool) -> PlantSample:
         tags, cut = self.tags, stamp + self._jitter

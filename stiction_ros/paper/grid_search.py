@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
@@ -105,7 +105,9 @@ def search(
     law, hard = smooth_law(options.law), options.grid_law == "hard"
     smoothing = final_smoothing(limits)
     best: GridPoint | None = None
-    for number, friction in enumerate(_points(limits, options.grid_step), start=1):
+    triangles = [nodes(limit, options.grid_step) for limit in limits.tolist()]
+    for number, rows in enumerate(itertools.product(*triangles), start=1):
+        friction = np.array(rows)
         stems = (
             law.hard_stems(record.op, friction)
             if hard
@@ -118,9 +120,3 @@ def search(
         progress(number / total)
     assert best is not None  # every triangle has its corner (0, 0)
     return best
-
-
-def _points(limits: FloatArray, step: float) -> Iterator[FloatArray]:
-    """Yield the frictions of all valves, shape (m, 2), one grid point after another."""
-    for rows in itertools.product(*(nodes(limit, step) for limit in limits.tolist())):
-        yield np.array(rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
 from stiction_ros.paper.paper_options import PaperOptions
@@ -10,34 +10,6 @@ from stiction_ros.paper.search_log import PaperIdentification
 from stiction_ros.records import Record
 
 Progress = Callable[[float], None]
-Method = Callable[[Record, PaperOptions, Progress | None], PaperIdentification]
-
-
-def _by_programme(
-    record: Record, options: PaperOptions, progress: Progress | None
-) -> PaperIdentification:
-    from stiction_ros.paper.programme.nlp import identify_by_programme  # CasADi loads slowly
-
-    return identify_by_programme(record, options, progress)
-
-
-def _as_printed(
-    record: Record, options: PaperOptions, progress: Progress | None
-) -> PaperIdentification:
-    from stiction_ros.paper.programme.printed import identify_as_printed  # CasADi loads slowly
-
-    return identify_as_printed(record, options, progress)
-
-
-def _by_grid(
-    record: Record, options: PaperOptions, progress: Progress | None
-) -> PaperIdentification:
-    from stiction_ros.paper.grid_search import identify_by_grid  # slow to import
-
-    return identify_by_grid(record, options, progress)
-
-
-METHODS: Mapping[str, Method] = {"nlp": _by_programme, "nlp_printed": _as_printed, "grid": _by_grid}
 
 
 def identify(
@@ -54,4 +26,11 @@ def identify(
     options = options or PaperOptions()
     if options.check_columns:
         refuse_swapped(record, swapped_columns(record))
-    return METHODS[options.method](record, options, progress)
+    # Each is slow to import.
+    if options.method == "grid":
+        from stiction_ros.paper.grid_search import identify_by_grid as search
+    elif options.method == "nlp_printed":
+        from stiction_ros.paper.programme.printed import identify_as_printed as search
+    else:
+        from stiction_ros.paper.programme.nlp import identify_by_programme as search
+    return search(record, options, progress)

@@ -68,7 +68,7 @@ def write_csv(
         tags = record.valves if key in ("op", "stem") else record.outputs
         for tag, column in zip(tags, values.T, strict=True):
             header.append(name if plain else column_name(key, tag))
-            columns.append([_cell(value) for value in column.tolist()])
+            columns.append(["" if math.isnan(x) else repr(x) for x in column.tolist()])
     if modes is not None:
         header.append(MODE)
         columns.append(list(modes))
@@ -81,10 +81,6 @@ def write_csv(
         # A semicolon in a name must not be taken for what separates the columns.
         (quoted if ";" in "".join(header) else writer).writerow(header)
         writer.writerows(zip(*columns, strict=True))
-
-
-def _cell(value: float) -> str:
-    return "" if math.isnan(value) else repr(value)
 
 
 def _iso(record: Record) -> list[str]:

@@ -307,10 +307,7 @@ class Record:
         """Return for each sample its row in :meth:`filled`, shape (N,)."""
         rows = np.arange(len(self))
         for before, after in itertools.pairwise(self.segments):
-            rows[after.first :] += min(max(self._missing(before, after), 1), len(self))
+            end = before.start + (before.last - before.first) * self.sample_time
+            missing = round((after.start - end) / self.sample_time)  # below 0 when time falls
+            rows[after.first :] += min(max(missing, 1), len(self))
         return rows
-
-    def _missing(self, before: Segment, after: Segment) -> int:
-        """Return how many samples are missing between two segments; below 0 when time falls."""
-        end = before.start + (before.last - before.first) * self.sample_time
-        return round((after.start - end) / self.sample_time)

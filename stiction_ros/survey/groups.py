@@ -32,7 +32,8 @@ class Group:
 def grouped(entries: Sequence[Entry]) -> tuple[list[Entry], list[Group]]:
     """Return the entries with the numbers of their groups, and the groups."""
     times = [np.array(entry.beats) for entry in entries]
-    clocks = [_clock(entry) for entry in entries]
+    # What two loops must share for their times to compare: dates, else their files.
+    clocks = ["dates" if e.beats and e.beats[0] > DATES else e.files for e in entries]
     cycling = [k for k, entry in enumerate(entries) if len(entry.beats) and _period(entry) > 0.0]
     cycling.sort(key=lambda k: _period(entries[k]))
     parent = list(range(len(entries)))
@@ -64,11 +65,6 @@ def grouped(entries: Sequence[Entry]) -> tuple[list[Entry], list[Group]]:
         for k in rows:
             numbered[k] = dataclasses.replace(numbered[k], group=number)
     return numbered, groups
-
-
-def _clock(entry: Entry) -> object:
-    """Return what two loops must share for their times to compare: dates, else their files."""
-    return "dates" if entry.beats and entry.beats[0] > DATES else entry.files
 
 
 def _period(entry: Entry) -> float:

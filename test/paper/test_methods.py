@@ -10,16 +10,12 @@ import simulated_loops as loops
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions
 from stiction_ros.paper import methods
-from stiction_ros.paper.methods import METHODS, identify
+from stiction_ros.paper.methods import identify
 from stiction_ros.paper.paper_options import METHOD_NAMES, PaperOptions
 
 SMALL = PaperOptions(
     output_order=1, input_order=1, delay=(5, 5), starts=1, grid_step=2.0, friction_limit=6.0
 )
-
-
-def test_the_table_and_the_options_name_the_same_methods() -> None:
-    assert tuple(METHODS) == METHOD_NAMES
 
 
 @pytest.mark.parametrize("method", METHOD_NAMES)

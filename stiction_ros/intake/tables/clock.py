@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -11,8 +12,8 @@ import numpy as np
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import SECONDS, IntakeOptions, TimeUnit, known_time_unit
-from stiction_ros.intake.sheets.cells import Cells
-from stiction_ros.intake.sheets.names import OR_ROW, TIME_NAMES
+from stiction_ros.intake.sheets.cells import Cells, is_number
+from stiction_ros.intake.sheets.names import OR_ROW, TIME_NAMES, read_tag
 from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.stamps import Clock, Times, is_stamp
 from stiction_ros.records.parts import DATES
@@ -113,3 +114,29 @@ def _scaled(times: Times, unit: TimeUnit, note: str) -> Times:
     dated = DATED[0] <= start <= DATED[1]
     clock = Clock(start, dated, dated and unit is not TimeUnit.DAYS)
     return times._replace(seconds=seconds, clock=clock, note=note)
+
+
+def kind_of(cells: Cells) -> str:
+    """Return what most cells of a column are: stamp, number, text; empty when nothing is there."""
+    if isinstance(cells, np.ndarray):
+        return "stamp" if cells.dtype.kind == "M" else "number"
+    counts = Counter(
+        "stamp" if is_stamp(cell) else "number" if is_number(cell) else "text"
+        for cell in cells[:: max(len(cells) // 100, 1)]
+        if cell.strip()
+    )
+    return counts.most_common(1)[0][0] if counts else ""
+
+
+def repeats(cells: Cells) -> bool:
+    """Return whether each cell of a column is there twice on average."""
+    return 2 * len(set(cells)) <= len(cells)
+
+
+def is_clock(name: str, cells: Cells) -> bool:
+    """Return whether a column holds stamps, or numbers under the name of a time."""
+    if (told := read_tag(name)) is not None and not told.quality:
+        return False
+    kind = kind_of(cells)
+    bare = re.sub(r"[\s._(#-]*\d*\)?$", "", name).casefold()
+    return kind == "stamp" or (kind == "number" and bare in TIME_NAMES)

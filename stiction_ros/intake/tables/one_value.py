@@ -20,8 +20,7 @@ from stiction_ros.intake.sheets.names import (
     read_tag,
 )
 from stiction_ros.intake.sheets.sheet import Sheet
-from stiction_ros.intake.tables.clock import TimeColumn, time_column
-from stiction_ros.intake.tables.kinds import is_clock, kind_of, repeats
+from stiction_ros.intake.tables.clock import TimeColumn, is_clock, kind_of, repeats, time_column
 from stiction_ros.intake.tables.qualities import quality_places
 from stiction_ros.intake.tables.tags import TagList
 

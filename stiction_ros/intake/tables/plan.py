@@ -14,8 +14,7 @@ from stiction_ros.intake.sheets.cells import Cells
 from stiction_ros.intake.sheets.names import OR_ROW, VALUE_NAMES, Tag, folded, read_tag
 from stiction_ros.intake.sheets.sheet import Sheet, stem
 from stiction_ros.intake.tables.block import Key
-from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, time_column
-from stiction_ros.intake.tables.kinds import is_clock
+from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, is_clock, time_column
 from stiction_ros.intake.tables.one_value import OneValue, one_value
 from stiction_ros.intake.tables.qualities import qualities_of, quality_places
 from stiction_ros.intake.tables.tags import TagList

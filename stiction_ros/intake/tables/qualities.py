@@ -10,7 +10,7 @@ import numpy as np
 
 from stiction_ros.intake.sheets.cells import BAD_WORDS, Cells, Words, number
 from stiction_ros.intake.sheets.names import folded, quality_kind, read_tag, without_quality
-from stiction_ros.intake.tables.kinds import kind_of, repeats
+from stiction_ros.intake.tables.clock import kind_of, repeats
 from stiction_ros.intake.words import WORDS, pattern_of
 
 _BAD, _GOOD = tuple(WORDS["bad_beginnings"]), pattern_of("good_words")

@@ -141,7 +141,7 @@ class ReplayedEstimator:
                 self._unusable(sample, "samples are missing")
 
     def _fit(self, live: LiveEstimator, end: int, record: Record) -> None:
-        whole = self._begins(end) >= (self.first or 0)
+        whole = max(end + 1 - self.settings.window, 0) >= (self.first or 0)
         if not whole:
             mapping = self._told.get(self._pairs.stamp_of(end))
             if mapping is None:
@@ -156,10 +156,6 @@ class ReplayedEstimator:
             self._unusable(end, f"window not usable: {said}")
             return
         self._conclude(live, end, found, whole=True)
-
-    def _begins(self, end: int) -> int:
-        """Return the first sample of the window that ends at ``end``."""
-        return max(end + 1 - self.settings.window, 0)
 
     def _conclude(
         self, live: LiveEstimator, end: int, found: Identification, *, whole: bool

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from collections.abc import Sequence
 from typing import Any
 
 from stiction_ros.online.replays.bag import ReplayBag
 from stiction_ros.online.replays.controller import SECOND, OpMatch
 from stiction_ros.online.replays.estimator import ReplayedFit
-from stiction_ros.records.run.events import ModeChange
+from stiction_ros.records.run.events import ModeChange, swap_of
 from stiction_ros.texts import finite
 
 
@@ -160,12 +159,3 @@ class Replay:
             "reason": change.reason,
             "friction": dict(change.frictions),
         }
-
-
-def swap_of(changes: Sequence[ModeChange], before: str = "") -> ModeChange | None:
-    """Return the first change from ``unaware`` to a mode that knows of the friction."""
-    for change in changes:
-        if before == "unaware" and change.mode in ("embedding", "inversion"):
-            return change
-        before = change.mode
-    return None

@@ -14,8 +14,12 @@ from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorN
 from stiction_ros.online.replays.bag import NodeConfig, ReplayBag, read_replay_bag
 from stiction_ros.online.replays.controller import SECOND, Offer, ReplayedControl, replay_controller
 from stiction_ros.online.replays.estimator import ReplayedEstimator
-from stiction_ros.online.replays.matching import match_fit, match_modes, trust_is_known
-from stiction_ros.online.replays.monitor import match_monitor
+from stiction_ros.online.replays.matching import (
+    match_fit,
+    match_modes,
+    match_monitor,
+    trust_is_known,
+)
 from stiction_ros.online.replays.result import FitMatch, Match, ModeMatch, Replay
 from stiction_ros.settings import from_mapping
 

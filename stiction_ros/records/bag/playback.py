@@ -71,7 +71,11 @@ def offered_qos(topic: BagTopic) -> Qos:
     """
     try:
         profiles = [
-            {key: _word(key, profile.get(key, 0)) for key in _NUMBERED}
+            {
+                key: value.lower() if isinstance(value, str) else words[int(str(value))]
+                for key, words in _NUMBERED.items()
+                for value in (profile.get(key, 0),)
+            }
             | {"depth": int(profile.get("depth", 0))}
             for profile in yaml.safe_load(topic.qos_yaml or "[]") or []
         ]
@@ -90,10 +94,6 @@ def offered_qos(topic: BagTopic) -> Qos:
         reliability="best_effort" if best_effort else "reliable",
         durability="transient_local" if latched else "volatile",
     )
-
-
-def _word(key: str, value: object) -> str:
-    return value.lower() if isinstance(value, str) else _NUMBERED[key][int(str(value))]
 
 
 class Playback:
@@ -197,13 +197,10 @@ class Playback:
         if self._place == len(self._messages):
             if self._loop:
                 self.rounds += 1
-                self._rewind()
+                self._bag_time, self._since, self._place = self._begin, self._clock(), 0
             else:
                 self._bag_time, self.finished = max(self.time, message.log_time), True
         return message
-
-    def _rewind(self) -> None:
-        self._bag_time, self._since, self._place = self._begin, self._clock(), 0
 
     def _anchor(self) -> None:
         self._bag_time, self._since = self.time, self._clock()

@@ -60,7 +60,8 @@ def news(topic: str, type_name: str, data: bytes) -> dict[str, str]:
     node, _, name = topic.rpartition("/")
     if name == "loop_model":
         return {f"loop_model:{topic}": text}
-    return {f"config:{node}": text} | _short(text)
+    told = mapping_of(text)
+    return {f"config:{node}": text} | {k: str(told[k]) for k in ("seed", "version") if k in told}
 
 
 def custom_data(run: Mapping[str, str]) -> dict[str, str]:
@@ -86,9 +87,3 @@ def mapping_of(text: str) -> dict[str, Any]:
     except (yaml.YAMLError, ValueError, RecursionError):  # a date such as 2026-13-45, 1000 brackets
         return {}
     return document if isinstance(document, dict) else {}
-
-
-def _short(text: str) -> dict[str, str]:
-    """Return seed and version of a configuration."""
-    document = mapping_of(text)
-    return {key: str(document[key]) for key in ("seed", "version") if key in document}

@@ -115,23 +115,37 @@ def estimates(messages: Iterable[BagMessage]) -> tuple[Estimate, ...]:
         state = message.message
         stamp = stamp_ns(state)
         for index, (name, value) in enumerate(zip(state.name, state.position, strict=False)):
-            low = _item(state.velocity, index)
-            high = _item(state.effort, index)
+            low, high = (
+                float(ends[index]) if index < len(ends) else math.nan
+                for ends in (state.velocity, state.effort)
+            )
             found.append(Estimate(stamp, str(name), float(value), low, high))
     return tuple(found)
 
 
 def mode_changes(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
     """Return the changes of mode, model or friction in ``/diagnostics``, with swap times."""
-    changes: list[ModeChange] = []
-    for stamp, _, values in _statuses(messages):
-        if "mode" not in values:
-            continue
-        model, reason = values.get("model", ""), values.get("reason", "")
-        change = ModeChange(stamp, values["mode"], model, reason, _frictions(values, "."))
-        if not changes or _force(changes[-1]) != _force(change):
-            changes.append(change)
-    return tuple(changes)
+    return without_repeats(
+        ModeChange(
+            stamp,
+            values["mode"],
+            values.get("model", ""),
+            values.get("reason", ""),
+            _frictions(values, "."),
+        )
+        for stamp, _, values in _statuses(messages)
+        if "mode" in values
+    )
+
+
+def without_repeats(changes: Iterable[ModeChange]) -> tuple[ModeChange, ...]:
+    """Drop changes that change neither mode nor model nor friction."""
+    kept: list[ModeChange] = []
+    for change in changes:
+        force = (change.mode, change.model, change.frictions)
+        if not kept or force != (kept[-1].mode, kept[-1].model, kept[-1].frictions):
+            kept.append(change)
+    return tuple(kept)
 
 
 def fits(messages: Iterable[BagMessage]) -> tuple[Fit, ...]:
@@ -156,9 +170,9 @@ def answer_times(messages: Iterable[BagMessage]) -> dict[str, float]:
     """Return the last p50, p99, p999 and max of the times from PV to OP, ms; empty in lockstep."""
     found: dict[str, float] = {}
     for _, _, told in _statuses(messages):
-        values = {name: _number(told.get(f"pv_to_op_ms_{name}", "")) for name in FIGURES}
-        if all(map(math.isfinite, values.values())):
-            found = values
+        with contextlib.suppress(KeyError, ValueError):
+            values = {name: float(told[f"pv_to_op_ms_{name}"]) for name in FIGURES}
+            found = values if all(map(math.isfinite, values.values())) else found
     return found
 
 
@@ -182,10 +196,6 @@ def stem_estimate(messages: Iterable[BagMessage], record: Record, start: int) ->
     return found if told else None
 
 
-def _force(change: ModeChange) -> tuple[object, ...]:
-    return change.mode, change.model, change.frictions
-
-
 def _frictions(values: Mapping[str, str], mark: str) -> dict[str, float]:
     """Return ``V1.f_s`` → value from keys such as ``V1.f_s`` or ``V1.trusted_f_s``."""
     found = {}
@@ -196,6 +206,15 @@ def _frictions(values: Mapping[str, str], mark: str) -> dict[str, float]:
         with contextlib.suppress(ValueError):
             found[f"{valve}.{name}"] = float(value)
     return found
+
+
+def swap_of(changes: Iterable[ModeChange], before: str = "") -> ModeChange | None:
+    """Return the first change from ``unaware`` to a mode that knows of the friction."""
+    for change in changes:
+        if before == "unaware" and change.mode in ("embedding", "inversion"):
+            return change
+        before = change.mode
+    return None
 
 
 def mode_texts(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
@@ -276,18 +295,5 @@ def _documents(
             yield int(end), values, document
 
 
-def _number(text: str) -> float:
-    """Return the number in a text; NaN for none."""
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
-
-
 def _of(messages: Iterable[BagMessage], type_name: str, name: str) -> Iterable[BagMessage]:
     return (m for m in messages if m.type == type_name and last_part(m.topic)[1] == name)
-
-
-def _item(values: Iterable[float], index: int) -> float:
-    items = list(values)
-    return float(items[index]) if index < len(items) else float("nan")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -29,6 +30,7 @@ from stiction_ros.records.run.events import (
     of_loop,
     published_counts,
     stem_estimate,
+    swap_of,
     tells_of_run,
     texts,
 )
@@ -71,15 +73,8 @@ class RunLog:
 
         A change whose first sample is not in the record, as it was cut there, is none.
         """
-        before = ""
         end = self.start + round(len(self.record) * self.record.sample_time * 1e9)
-        for change in self.modes:
-            if change.stamp >= end:
-                break
-            if before == "unaware" and change.mode in ("embedding", "inversion"):
-                return change
-            before = change.mode
-        return None
+        return swap_of(itertools.takewhile(lambda change: change.stamp < end, self.modes))
 
     @property
     def swap_sample(self) -> int | None:
@@ -164,8 +159,8 @@ def _said(
     """Return what was said between the beginning of a run and that of the next one."""
     place = runs.index(run)
     begin = run.begin if place else 0
-    end = runs[place + 1].begin if place + 1 < len(runs) else None
-    return [m for number, m in messages if begin <= number and (end is None or number < end)]
+    end = runs[place + 1].begin if place + 1 < len(runs) else math.inf
+    return [m for number, m in messages if begin <= number < end]
 
 
 def _record(run: LoopRun, runs: Sequence[LoopRun]) -> Record:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.events import ModeChange
+from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.page import Cell, count, duration, folded, interval, number, percent, table
 from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.identified import (
@@ -14,7 +18,6 @@ from stiction_ros.report.run.identified import (
     valve_cards,
     verdict_line,
 )
-from stiction_ros.report.run.monitor_section import monitor_section
 from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import Story
 from stiction_ros.report.run.summary import measured, messages
@@ -295,3 +298,33 @@ def _notes(story: Story) -> str:
     if not notes:
         return ""
     return "<h2>Notes</h2><ul>" + "".join(f"<li>{text(note)}</li>" for note in notes) + "</ul>"
+
+
+def monitor_section(log: RunLog) -> str:
+    """Return every measurement of the gap with what was found; empty without a monitor."""
+    looks = log.gaps.looks
+    if not looks:
+        return ""
+    rows: list[list[Cell]] = []
+    for stamp, look in looks.items():
+        found = log.gaps.findings.get(stamp, {})
+        outputs = look.get("outputs", {})
+        rows.append(
+            [
+                duration(log.seconds(stamp)),
+                ("bad", "grown") if look.get("grown") else "as in the baseline",
+                str(found.get("text", "")) or str(look.get("failure", "")),
+                ", ".join(f"{name} {_growth(one)}" for name, one in outputs.items()),
+            ]
+        )
+    grown = sum(bool(look.get("grown")) for look in looks.values())
+    said = f"The gap between loop and model was measured {len(looks)} times; "
+    said += f"in {grown} of them it had grown." if grown else "it never grew."
+    head = ("window ends", "gap", "found", "times the baseline’s (limit)")
+    return f"<h2>The monitor</h2><p>{words(said)}</p>" + table(head, rows, texts=3)
+
+
+def _growth(look: Mapping[str, Any]) -> str:
+    gap, baseline, limit = (look.get(key) for key in ("gap", "baseline", "limit"))
+    share = gap / baseline if isinstance(gap, float) and baseline else None
+    return f"{number(share)} ({number(limit)})"

@@ -124,7 +124,7 @@ def write_csv(path: Path, entries: Sequence[Entry]) -> None:
     writer = csv.writer(text, lineterminator="\r\n")
     writer.writerow(HEAD)
     for entry in entries:
-        writer.writerow(["" if cell is None else _short(cell) for cell in cells(entry)])
+        writer.writerow([_short(cell) for cell in cells(entry)])
     path.write_text(text.getvalue(), encoding="utf-8-sig", newline="")
 
 
@@ -168,5 +168,5 @@ def _column(number: int) -> str:
     return letters
 
 
-def _short(value: Cell) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+def _short(value: Cell | None) -> str:
+    return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
