@@ -47,11 +47,7 @@ _AS_ARGUMENTS = (
 
 
 class ColumnSheet(Sheet):
-    """Columns in memory by name, shape (N,) each: numbers, times or texts.
-
-    Raises:
-        InputError: columns that are not of one length.
-    """
+    """Columns in memory by name, shape (N,) each: numbers, times or texts."""
 
     row_word = "row"
 

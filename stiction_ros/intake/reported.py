@@ -74,10 +74,7 @@ def at_pv(block: Block, rules: Rules) -> Block | None:
 def on_grid(block: Block, sample_time: float | None, rules: Rules) -> list[Block]:
     """Return a block with regular stamps for each stretch without a gap.
 
-    Args:
-        block: signals at increasing stamps, blank where nothing was reported.
-        sample_time: s; None takes the scan that the stamps show.
-        rules: get the note.
+    Signals are blank where nothing was reported. A sample time of None is the stamps' scan, s.
     """
     stamps = _reports(block)
     needed = {key: stamps[key] for key in block.of("op", "pv")}

@@ -14,8 +14,7 @@ import yaml
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.effects import from_mapping as effect_from_mapping
 from stiction_ros.errors import InputError, foreign
-from stiction_ros.loop.places import append_effect
-from stiction_ros.loop.yaml_effects import at_place, read_effects
+from stiction_ros.loop.places import append_effect, at_place, read_effects
 from stiction_ros.loop.yaml_process import Instrument, read_instruments, read_process
 from stiction_ros.loop.yaml_reading import Section, load_yaml, parse_yaml
 from stiction_ros.processes import Process

@@ -9,7 +9,7 @@ import yaml
 
 from stiction_ros.effects import Behaviour
 from stiction_ros.errors import InputError
-from stiction_ros.loop.yaml_effects import read_effects
+from stiction_ros.loop.places import read_effects
 from stiction_ros.loop.yaml_reading import Section, parse_yaml
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.loop.yaml_effects import read_effects
+from stiction_ros.loop.places import read_effects
 from stiction_ros.loop.yaml_reading import Section
 from stiction_ros.processes import (
     AlteredProcess,

@@ -21,10 +21,7 @@ async def browse(url: str, credentials: Credentials, root: str) -> dict[tuple[st
     """Return node ids of all variables below ``root``, or the folder Objects, by group and name.
 
     ``FIC101.PV`` is PV of the group FIC101, and so is a variable PV in a folder FIC101. Node ids
-    name their namespace. Errors are those of :mod:`.session`.
-
-    Raises:
-        InputError: no such node, or more than 200 000 nodes.
+    name their namespace. Errors are those of :mod:`.session`, and more than 200 000 nodes.
     """
     client = await open_client(url, credentials)
     try:

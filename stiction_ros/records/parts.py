@@ -41,11 +41,7 @@ def only_part(parts: Sequence[Record], where: str) -> Record:
 
 
 def longest_part(parts: Sequence[Record]) -> Record:
-    """Return the longest stretch of good samples of one source, its notes saying which it is.
-
-    Raises:
-        InputError: no good samples.
-    """
+    """Return the longest stretch of good samples, noting which it is; InputError without any."""
     good = [part for each in parts for part in each.good_parts()]
     if not good:
         raise InputError("has no good samples", where=parts[0].name)

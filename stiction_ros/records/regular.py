@@ -1,21 +1,20 @@
 """Makes a regular record of samples that are slightly irregular, and says what it did.
 
-A row is a sample: its values stay together and are never mixed with those of its neighbours.
-Each row gets a place, an integer; only places without a row are filled.
+A row is a sample with a place, an integer; only places without a row are filled.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
+from stiction_ros.errors import InputError
 from stiction_ros.records.quality import Quality, QualityArray
-from stiction_ros.records.sampling import TOLERATED, shortest
 
 GAP = 5.5  # a step of more usual steps than this is a gap: the record is split there
 
@@ -149,12 +148,7 @@ def spread_evenly(
 
     Then every stamp has as many rows but for one, stamps follow each other evenly, and what stands
     in the rows differs; where a stamp has one row, those with two come evenly. None for rows that
-    are there twice.
-
-    Args:
-        time: never falling, shape (rows,), s.
-        first: first row of each stamp.
-        values: of each signal, shape (rows,).
+    are there twice. The ``first`` rows are those at which stamps begin; times, s, never fall.
     """
     if len(first) < FEWEST_STAMPS:
         return None
@@ -241,3 +235,65 @@ def _of_rounded(given: FloatArray) -> IntArray | None:
             low, high = behind - 0.5, behind + 0.5
         low, high = max(low, behind - 0.5), min(high, behind + 0.5)
     return counts
+
+
+SILENT = 1e-4  # jitter, as a share of the sample time, that is rounding and not worth a word
+TOLERATED = 0.1  # jitter, as a share of the sample time, that is taken as regular with a note
+
+
+def sample_time(
+    time: FloatArray, where: str, place: Callable[[int], str]
+) -> tuple[float, tuple[str, ...]]:
+    """Return the seconds between two samples, and one note when the jitter is more than rounding.
+
+    Args:
+        time: times of the N samples in s, shape (N,).
+        where: file or bag, for errors.
+        place: names a sample for errors, ``place(3)`` → ``line 5``.
+
+    Raises:
+        InputError: fewer than two samples, time that does not increase, a gap.
+    """
+    if len(time) < 2:
+        raise InputError(
+            f"has {len(time)} sample{'s' * (len(time) != 1)}",
+            where=where,
+            fix="a record needs two at least",
+        )
+    steps = np.diff(time)
+    if not (steps > 0).all():
+        row = int(np.argmin(steps > 0)) + 1
+        raise InputError(
+            f"time does not increase at {place(row)} ({time[row - 1]:.9g}, then {time[row]:.9g} s)",
+            where=where,
+            fix="sort the rows and remove those that are there twice",
+        )
+    usual = float(np.median(steps))
+    jitter = np.abs(steps - usual) / usual
+    worst = int(np.argmax(jitter))
+    if jitter[worst] > TOLERATED:
+        row = int(np.argmax(jitter > TOLERATED)) + 1
+        raise InputError(
+            f"time is irregular at {place(row)}: {steps[row - 1]:.6g} s after the sample before, "
+            f"elsewhere {usual:.6g} s",
+            where=where,
+            fix="cut the record there or resample it",
+        )
+    step = shortest(time[0], time[-1], len(steps), max(float(jitter[worst]), 1e-5))
+    if jitter[worst] <= SILENT:
+        return step, ()
+    note = f"sample times jitter by up to {100 * jitter[worst]:.2g} %, taken as regular"
+    return step, (note,)
+
+
+def shortest(first: float, last: float, steps: int, tolerance: float) -> float:
+    """Return the shortest decimal that is the step, s, of ``steps`` steps from one time to another.
+
+    The last time may be moved by ``tolerance`` steps.
+    """
+    mean = float(last - first) / steps
+    for digits in range(1, 15):
+        short = float(f"{mean:.{digits}g}")
+        if abs(short - mean) * steps <= tolerance * mean:
+            return short
+    return mean

@@ -12,8 +12,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.quality import QualityArray
 from stiction_ros.records.record import Record
-from stiction_ros.records.regular import HOLE, Part, regular_part, split_at_gaps
-from stiction_ros.records.sampling import sample_time
+from stiction_ros.records.regular import HOLE, Part, regular_part, sample_time, split_at_gaps
 
 
 @dataclasses.dataclass(frozen=True)

@@ -87,11 +87,7 @@ Rows = Callable[[], contextlib.AbstractContextManager[Iterator[tuple[int, list[s
 
 
 class RowSheet(Sheet):
-    """A table of text cells, row by row, with a ``delimiter`` between them, empty for a workbook.
-
-    Raises:
-        InputError: it is empty, has no header, or more cells than names.
-    """
+    """A table of text cells, row by row, with a ``delimiter``, empty for a workbook."""
 
     def __init__(self, path: Path, name: str, rows: Rows, delimiter: str) -> None:
         self.path, self.name, self._rows = path, name, rows

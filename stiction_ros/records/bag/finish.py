@@ -67,11 +67,9 @@ def storage_path(directory: Path, number: int = 0) -> Path:
 def finish_bag(directory: str | Path, packing: Packing = Packing()) -> tuple[str, ...]:
     """Rewrite the journals of a bag chunked and indexed and write its ``metadata.yaml``.
 
-    Where there is a simulated time, what was received before it was known (configurations,
-    latched topics) came at wall time, years away; it gets the first simulated time.
-
-    A journal is replaced when the new file is complete on the disk, so that a second kill
-    loses nothing either.
+    What was received before simulated time was known (configurations, latched topics) came at wall
+    time, years away; it gets the first simulated time. A journal is replaced when the new file is
+    complete on the disk, so that a second kill loses nothing either.
 
     Returns:
         What was left out, one sentence each; empty when nothing was.
@@ -91,8 +89,7 @@ def finish_bag(directory: str | Path, packing: Packing = Packing()) -> tuple[str
 def log_time_caps(files: Sequence[Path]) -> list[int | None]:
     """Return for each file the log time, ns, that what came before simulated time gets.
 
-    It is the first simulated time, for the files up to the one in which it is; None for those
-    behind it, and for all when the bag knows no simulated time.
+    It is the first simulated time up to the file in which that is; else None.
     """
     found: tuple[int, int] | None = None
     for number, file in enumerate(files):
@@ -116,11 +113,8 @@ def rewrite(
 ) -> FileContent:
     """Rewrite one file chunked and indexed, in its place.
 
-    Args:
-        path: the file, a journal for example.
-        packing: of the new file.
-        cap: first simulated time of the bag, ns; until it comes messages get it as log time.
-        salvage: leave out what is damaged, with a note, instead of raising.
+    Messages get ``cap``, the first simulated time of the bag, ns, as log time until it comes. To
+    ``salvage`` is to leave out what is damaged, with a note, instead of raising.
     """
     scan = McapScan(path, salvage=salvage)
     partial = path.with_suffix(".mcap.part")

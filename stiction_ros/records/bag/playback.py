@@ -106,11 +106,8 @@ class Playback:
         content: of the bag.
         clock: a steady clock, ns.
         rate: recorded seconds per second of the clock, above 0.
-        start: seconds of recorded time that are passed over at the beginning.
+        start: seconds of recorded time that are passed over at the beginning, within the bag.
         loop: whether to begin again at the end.
-
-    Raises:
-        InputError: a rate that is not positive, or a start beyond the end.
     """
 
     def __init__(

@@ -46,14 +46,10 @@ class Repair:
 
 
 def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noqa: B008 (frozen)
-    """Repair a bag in its place.
+    """Repair a bag, a rosbag2 directory or one ``.mcap`` file, in its place.
 
     A file that was damaged is kept beside the new one, as ``….mcap.damaged``. What the bag
     says of its run is kept. A whole bag is left as it is.
-
-    Args:
-        path: a rosbag2 directory, or one ``.mcap`` file.
-        packing: of files that are rewritten.
 
     Raises:
         InputError: no such bag, one of another kind, or a file that is no MCAP file at all.

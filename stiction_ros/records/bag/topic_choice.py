@@ -23,9 +23,6 @@ def topic_choice(
         regex: of full names; :data:`OWN` for the loop of the namespace.
         exclude: of full names that are left out, also when ``names`` has them.
         namespace: of the recorder.
-
-    Raises:
-        InputError: no regular expression, or nothing is chosen at all.
     """
     if not names and not regex:
         raise InputError("no topic is chosen", where="recorder", fix="set topics or regex")

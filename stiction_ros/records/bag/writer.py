@@ -53,13 +53,9 @@ class BagWriter:
     """A rosbag2 bag (MCAP storage) being written; also a context manager.
 
     Every message is one unchunked record, handed to the operating system before :meth:`write`
-    returns. One thread writes. Times are integers in nanoseconds. What ``~/config`` and
-    ``loop_model`` say is kept as metadata of the run too.
-
-    Args:
-        directory: the bag; made with its parents, must not hold anything yet.
-        packing: of the finished bag.
-        splitting: when the next file begins.
+    returns. One thread writes. Times are integers in ns. What ``~/config`` and
+    ``loop_model`` say is kept as metadata of the run too. The directory is made with parents and
+    must not hold anything yet.
     """
 
     def __init__(
@@ -96,14 +92,10 @@ class BagWriter:
         type_hash: str,
         qos: Qos | Iterable[Qos] = Qos(),  # noqa: B008 (frozen)
     ) -> None:
-        """Announce a topic before its first message.
+        """Announce a topic, by full name and type such as ``sensor_msgs/msg/JointState``.
 
-        Args:
-            name: full topic name.
-            type: ``sensor_msgs/msg/JointState``; a topic that is there with another is refused.
-            definition_text: definition with dependencies, see :func:`definition`.
-            type_hash: ``RIHS01_…`` or empty.
-            qos: what its publishers offer, one profile or one for each.
+        Its definition has its dependencies with it, and a hash or none, as :func:`definition`
+        gives them; ``qos`` is one profile of its publishers or one for each.
         """
         self._open()
         profiles = (qos,) if isinstance(qos, Qos) else tuple(qos)
@@ -121,16 +113,10 @@ class BagWriter:
         self._entries[name] = entry
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
-        """Write one serialised message (CDR); it is safe from a kill when this returns.
+        """Write one serialised message (CDR) of a topic; it is safe from a kill when this returns.
 
-        Args:
-            topic: a name given to :meth:`add_topic`; another one is refused.
-            data: the bytes of a raw subscription.
-            log_time: when it was received, ns; simulated time when there is a clock.
-            publish_time: when it was sent, ns.
-
-        Raises:
-            OSError: the storage refuses, a full disk for example.
+        Log time, when it was received, is simulated when there is a clock; ``publish_time`` is when
+        it was sent, ns. Where the storage refuses, as a full disk does, it is an OSError.
         """
         try:
             entry = self._entries[topic]

@@ -1,9 +1,7 @@
 """Tells the runs in a bag apart: a plant that was restarted begins its stamps anew.
 
-Around a restart messages of both runs may stand in the bag in any order, so the stamps are
-followed as *chains*: each message continues the chain whose next stamp it bears. A chain that
-begins, in stamps and in the log, behind the end of another goes on with it after a gap; one
-whose stamps fall back is another run.
+Stamps are followed as *chains*: messages of both runs may stand in any order. A chain that begins
+behind the end of another goes on with it after a gap; one whose stamps fall back is another run.
 """
 
 from __future__ import annotations

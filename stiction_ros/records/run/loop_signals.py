@@ -37,11 +37,7 @@ class LoopSignals:
         self._bad: dict[tuple[str, str], Counter[str]] = {}
 
     def add(self, message: BagMessage, number: int) -> None:
-        """Take one message of a topic that :func:`is_signal`; what is wrong with it is counted.
-
-        Raises:
-            InputError: the definition in the bag is not that of the type.
-        """
+        """Take one message of a topic that :func:`is_signal`; what is wrong with it is counted."""
         key = last_part(message.topic)
         try:
             names, values = message.message.name, message.message.position

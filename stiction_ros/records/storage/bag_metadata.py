@@ -24,11 +24,7 @@ _WORDS = {
 
 @dataclasses.dataclass(frozen=True)
 class Qos:
-    """Quality of service that a publisher offers.
-
-    Raises:
-        InputError: a word that ROS does not know.
-    """
+    """Quality of service that a publisher offers; a word that ROS does not know is refused."""
 
     history: str = "keep_last"  # ``keep_last``, ``keep_all``, ``system_default`` or ``unknown``
     depth: int = 10  # messages kept when history is ``keep_last``

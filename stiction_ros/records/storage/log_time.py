@@ -9,11 +9,10 @@ SIMULATED = "stiction_simulated_time"
 
 
 class LogTime:
-    """Gives each message its log time, ns.
+    """Gives each message its log time, ns: that of reception until a simulated one is known.
 
-    Until a simulated time is known it is the time of reception. Simulated time that falls back
-    is passed over; when it goes on from there, as after the restart of a plant, log time goes
-    on with it from where it stood.
+    Simulated time that falls back is passed over; when it goes on from there, as after a restart of
+    a plant, log time goes on with it from where it stood.
     """
 
     def __init__(self) -> None:

@@ -1,8 +1,6 @@
 """Reads the records of one MCAP file from its beginning, whole, unfinished or damaged.
 
-The readers of the package ``mcap`` want a finished file, or give back the torn message at the end
-of an unfinished one as if it were whole. This one gives back complete messages only, and compares
-every checksum that the file carries: of chunks, of the data, of the summary.
+Unlike the readers of ``mcap`` it gives back complete messages only and compares every checksum.
 """
 
 from __future__ import annotations

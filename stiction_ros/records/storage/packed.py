@@ -31,11 +31,7 @@ def conversion(bag: Path) -> str:
 
 @contextlib.contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
-    """Open a storage file; one that is packed with Zstandard is unpacked into a temporary file.
-
-    Raises:
-        InputError: packed, and cut off or damaged.
-    """
+    """Open a storage file; one packed with Zstandard is unpacked into a temporary file."""
     with path.open("rb") as file:
         packed = file.read(len(ZSTD)) == ZSTD
         file.seek(0)

@@ -6,20 +6,26 @@ that is killed is replaced and its loop tried once more. A worker gets its loop 
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
+import multiprocessing
+import os
 import signal
+import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.process import BaseProcess
+from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification.warm_up import compile_loops
 from stiction_ros.intake.loop import Loop
+from stiction_ros.orphans import spared
 from stiction_ros.survey.assess import Assessed, assess
 from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Task, lost
-from stiction_ros.survey.engines.start import context_of, started
 from stiction_ros.survey.survey_options import SurveyOptions
 
 LONGEST = 600.0  # seconds that one loop may take; a usual one takes a second or two
@@ -198,3 +204,42 @@ def _work(pipe: Connection, options: SurveyOptions) -> None:
             pipe.send(answer)
         except (BrokenPipeError, OSError):
             return
+
+
+def context_of(module: str) -> ForkServerContext | SpawnContext:
+    """Return how processes are started here; a server, if there is one, imports ``module`` once."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([module])
+    return context
+
+
+def started(
+    context: ForkServerContext | SpawnContext, work: Callable[..., None], *arguments: Any
+) -> BaseProcess:
+    """Return a process of a :func:`context_of` that does ``work`` and ends with this one."""
+    process = context.Process(target=work, args=arguments, daemon=True)
+    with same_imports(), spared():
+        process.start()
+    return process
+
+
+@contextlib.contextmanager
+def same_imports() -> Iterator[None]:
+    """Let interpreters that are started inside look for modules where this one does, nowhere else.
+
+    ``multiprocessing`` tells that to a worker, but not to the server that workers are forked from.
+    """
+    here = os.getcwd()
+    told = {"PYTHONPATH": os.pathsep.join(path or here for path in sys.path), "PYTHONSAFEPATH": "1"}
+    before = {name: os.environ.get(name) for name in told}
+    os.environ.update(told)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
