@@ -17,10 +17,7 @@ if TYPE_CHECKING:
     from stiction_ros.survey.survey import Survey
 
 SHOWN = 30  # rows of the list that are printed
-
-ALWAYS, CAUSE = 3, 6
-"""Columns that stand in the narrowest window, and the first one that is broken between words."""
-
+ALWAYS, CAUSE = 3, 6  # columns that are always there, and the first that is broken between words
 APART = 2  # blanks between two columns
 
 

@@ -27,8 +27,7 @@ class OpUnit(enum.StrEnum):
     OTHER = "other"  # anything else; OP is taken as it is
 
 
-LETTERS = {"op": "V", "pv": "PV", "sp": "PV", "stem": "V"}
-"""Signal to what the tags of its valves or outputs begin with, where none are given."""
+LETTERS = {"op": "V", "pv": "PV", "sp": "PV", "stem": "V"}  # first letters of tags, if none
 
 TO_PERCENT = {
     OpUnit(unit): (100.0 / (high - low), -100.0 * low / (high - low))

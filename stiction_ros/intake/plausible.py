@@ -31,9 +31,7 @@ while the move grows. Of the field's loops 1 in 160 is called swapped as it is, 
 that are.
 """
 
-SAID = {unit: WORDS["op_ranges"][unit][2] for unit in TO_PERCENT}
-"""Units of an OP as notes name them."""
-
+SAID = {unit: WORDS["op_ranges"][unit][2] for unit in TO_PERCENT}  # units as notes say
 SEVERAL = frozenset(WORDS["several"])  # units of OP of which several ranges are usual
 OWN = "its own unit"  # what stands for the unit of an OP that is not known to be in %
 EXAMINED = 20_000  # samples that are looked at

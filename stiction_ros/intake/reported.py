@@ -19,9 +19,7 @@ from stiction_ros.records.quality import Quality, QualityArray
 from stiction_ros.records.regular import GAP
 from stiction_ros.texts import plural
 
-COVERED = 0.75
-"""Share of all stamps that OP and PV each have, from which they were sampled together."""
-
+COVERED = 0.75  # share of all stamps that OP and PV each have if they were sampled together
 ON_GRID = 0.9  # share of the steps that are multiples of the smallest, from which there is a scan
 DENSEST = 10.0  # samples for one report of the signal that is reported most, at most
 QUIET = 60  # samples that a signal may stay without a report before it counts as a gap

@@ -24,8 +24,7 @@ BEYOND = 1e4  # times the size of the record from which on a run is taken as gon
 Control = Callable[[int, FloatArray, FloatArray], None]
 """Sets OP of sample k, shape (R, N, m), by PV, shape (R, N, p), up to it."""
 
-Laws = Sequence[Sequence[Behaviour | None]]
-"""Law of each valve of each run; None where the stem follows OP."""
+Laws = Sequence[Sequence[Behaviour | None]]  # of each valve of each run; None: ideal
 
 
 class Equations(NamedTuple):

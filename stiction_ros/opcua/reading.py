@@ -6,8 +6,7 @@ import dataclasses
 import enum
 import math
 
-LOCAL_OVERRIDE = 0x00960000
-"""Good_LocalOverride: somebody put the value in by hand; it is no measurement (OPC UA part 8)."""
+LOCAL_OVERRIDE = 0x00960000  # OPC UA part 8: put in by hand, so it is no measurement
 
 
 class TagQuality(enum.IntEnum):

@@ -12,9 +12,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 
 WHOLE = 1e-9  # samples by which a dead time may be off a whole number of them and counts as that
-
-Channel = tuple[FloatArray, FloatArray, int]
-"""How one PV answers one valve: b₁ …, a₀ = 1, a₁ … and the delay in samples."""
+Channel = tuple[FloatArray, FloatArray, int]  # b₁ …, a₀ = 1, a₁ … and the delay in samples
 
 
 def held(num: ArrayLike, den: ArrayLike, dead_time: float, sample_time: float) -> Channel:

@@ -23,21 +23,12 @@ SLIGHT = 0.1
 from their mean, over that mean: rows missing at random make the one as large as the other."""
 
 HOLE = 1.5  # a step of more usual steps than this is a hole in which samples are missing
-
-CAUGHT_UP = 0.25
-"""Steps by which rows may still be late when the delay of one of them is over: half of what a
-row may be off its place."""
-
+CAUGHT_UP = 0.25  # steps by which rows may still be late when a delay is over: half of the most
 SHORTEST = 3  # samples that a repair needs at least
 FEWEST_STAMPS = 5  # stamps from which on it can be told that they are cut off
-
-DIFFERENT = 0.5
-"""Share of rows with a stamp that was there already in which OP or PV must differ, for the same."""
-
+DIFFERENT = 0.5  # share of rows with a stamp of before in which OP or PV must differ
 BY_CHANCE = 1e-3  # chance with which rows lost at random may pass for stamps with too few digits
-
-WHOLE = 1e-3
-"""Share of the smallest step by which others are off its multiples in rounded stamps, at most."""
+WHOLE = 1e-3  # share of the smallest step by which others may be off its multiples
 
 
 @dataclasses.dataclass(frozen=True)

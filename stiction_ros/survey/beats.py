@@ -9,10 +9,7 @@ from stiction_ros.signals.movement import moving, size
 from stiction_ros.signals.oscillation import turnings
 
 MOST = 200  # beats that are kept of a record, the last ones
-
-FEWEST = 5
-"""Beats of one loop, while the other one was recorded too, from which two can be compared."""
-
+FEWEST = 5  # beats of one loop from which two can be compared
 ALIKE = 0.05  # logarithm of the ratio of two periods up to which they may be the same
 
 LOCKED = 0.85

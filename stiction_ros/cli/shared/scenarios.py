@@ -13,8 +13,7 @@ from stiction_ros.errors import InputError
 
 SCENARIOS = ("tank", "siso")  # those that are run where none is named
 ALL = (*SCENARIOS, "siso_test", "tank_test")
-STARTED = ("recorder", "estimator", "controller", "plant")
-"""The nodes of a loop, in the order in which they are started."""
+STARTED = ("recorder", "estimator", "controller", "plant")  # in this order
 
 
 def find(name: str) -> Path:

@@ -18,9 +18,7 @@ from stiction_ros.intake.words import pattern_of
 Cells = Sequence[str] | NDArray[np.float64] | NDArray[np.datetime64]
 """One column of a piece of a table: text, numbers or stamps."""
 
-BAD_WORDS = pattern_of("bad_words")
-"""What historians write in the place of a number; anything else that is no number counts too."""
-
+BAD_WORDS = pattern_of("bad_words")  # what historians write in the place of a number
 SHOWN = 30  # characters of a cell that an error shows
 
 _SIGNS = str.maketrans({"\u2212": "-", "\u00a0": "", "\u202f": "", "\u2009": "", "'": ""})

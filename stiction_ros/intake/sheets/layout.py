@@ -13,9 +13,7 @@ from stiction_ros.intake.sheets.names import VALUE_NAMES, is_name, read_tag
 from stiction_ros.intake.sheets.stamps import is_stamp
 from stiction_ros.intake.words import pattern_of
 
-DELIMITERS = ("\t", ";", "|", ",")
-"""In the order in which they are tried: commas and bars may stand inside cells."""
-
+DELIMITERS = ("\t", ";", "|", ",")  # in the order tried: commas and bars may stand inside cells
 SPACE = " "  # what stands for white space of any length
 WHOLE = 0.6  # share of the usual number of cells that a row of data has at least
 LOOKED_AT = 40  # lines at the top of a file that are looked at

@@ -220,5 +220,4 @@ def stem(path: Path) -> str:
 TEXT = ("csv", "tsv", "txt", "tab", "dat", "gz", "zst", "zstd")
 
 KINDS = (*TEXT, "parquet", "pq", "xlsx", "xlsm", "xls", "mcap", "db3")
-SUFFIXES = frozenset(f".{end}" for end in KINDS)
-"""Ends of the names of files that are read from folders."""
+SUFFIXES = frozenset(f".{end}" for end in KINDS)  # of files that are read from folders

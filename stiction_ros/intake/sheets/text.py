@@ -35,9 +35,7 @@ REFUSED = (
 
 HEAD = 4096  # bytes by which the encoding is told
 SHORTEST = 16  # bytes from which UTF-16 without its mark is told
-
-NULLS = 0.7
-"""Share of zero bytes on one side of the pairs from which text is UTF-16 without its mark."""
+NULLS = 0.7  # share of zero bytes on one side of the pairs in UTF-16 without its mark
 
 
 def _as_western(error: UnicodeError) -> tuple[str, int]:

@@ -19,18 +19,10 @@ from stiction_ros.intake.sheets.stamps import Clock, Times, is_stamp
 from stiction_ros.records.parts import DATES
 
 DATED = (DATES, 4e9)  # seconds since 1970 that are taken for dates: 1979 to 2096
-
-SPREADSHEET = (25569.0, 73050.0)
-"""Days since the last of 1899 in which spreadsheets count 1970 to 2099."""
-
-LONG = 500.0
-"""Steps from which a number that is no multiple of a minute is perhaps in milliseconds, s."""
-
-DAY_LONG = 14400.0
-"""Steps from which any number is perhaps in milliseconds, s: nobody keeps a loop each 4 h."""
-
-SHORT = 0.05
-"""Step, as a number, below which times as large as a spreadsheet's days may be such days."""
+SPREADSHEET = (25569.0, 73050.0)  # days since the last of 1899, for 1970 to 2099
+LONG = 500.0  # s; longer steps that are no multiple of a minute may be milliseconds
+DAY_LONG = 14400.0  # s; longer steps may be milliseconds: nobody keeps a loop each 4 h
+SHORT = 0.05  # a number; shorter steps of large times may be days of a spreadsheet
 
 _MIDNIGHT = re.compile(r"[T ]0?0:00(:00(\.0+)?)?$")
 

@@ -30,8 +30,7 @@ from stiction_ros.online.schedule import FitSchedule
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
 
-METHOD = "exact"
-"""Search of the windows: a sliding window is fitted again and again, beside a loop that runs."""
+METHOD = "exact"  # a sliding window is fitted again and again, beside a loop that runs
 
 LAWS = ("he", "kano", "choudhury", "xch", "semi_physical", AUTO)
 

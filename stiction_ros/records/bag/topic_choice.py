@@ -7,8 +7,7 @@ from collections.abc import Callable, Sequence
 
 from stiction_ros.errors import InputError
 
-OWN = "own"
-"""Instead of an expression: the topics of the recorder's namespace and those of the graph."""
+OWN = "own"  # in place of an expression: topics of the recorder's namespace and of the graph
 
 GLOBAL = ("clock", "diagnostics", "parameter_events", "rosout")
 

@@ -55,8 +55,7 @@ class Qos:
         return values
 
 
-LATCHED = Qos(depth=1, durability="transient_local")
-"""QoS of topics whose last message late joiners get."""
+LATCHED = Qos(depth=1, durability="transient_local")  # late joiners get the last message
 
 
 @dataclasses.dataclass(frozen=True)

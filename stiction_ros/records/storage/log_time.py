@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 AGAIN = 10  # older times in succession, increasing, after which time is taken to have begun anew
-
-SIMULATED = "stiction_simulated_time"
-"""Metadata record that a recorder writes when it learns the first simulated time."""
+SIMULATED = "stiction_simulated_time"  # metadata record with the first simulated time
 
 
 class LogTime:

@@ -13,8 +13,7 @@ import zstandard
 
 from stiction_ros.errors import InputError
 
-SUFFIXES = (".zstd", ".zst")
-"""Ends of the names of files that are packed with Zstandard; rosbag2 writes the first."""
+SUFFIXES = (".zstd", ".zst")  # of files packed with Zstandard; rosbag2 writes the first
 
 SQLITE = b"SQLite format 3\0"
 ZSTD = b"\x28\xb5\x2f\xfd"  # first bytes of a file of either kind

@@ -11,8 +11,7 @@ from stiction_ros.survey.assess import Assessed
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.survey_options import SurveyOptions
 
-ATTEMPTS = 3
-"""Times that a loop is tried whose worker dies: one that kills workers must not kill all."""
+ATTEMPTS = 3  # times that a loop is tried whose worker dies: it may kill workers
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,9 +15,7 @@ from stiction_ros.survey.pages.words import cause_words
 
 Cell = str | float | int | None
 
-FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
-"""What a text begins with that spreadsheets take for a formula."""
-
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # how a formula of a spreadsheet begins
 STAMP = (1980, 1, 1, 0, 0, 0)  # time of the files inside the XLSX: the same list is the same file
 
 _TYPES = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>

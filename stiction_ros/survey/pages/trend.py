@@ -10,8 +10,7 @@ from stiction_ros.pages.plot import spark
 from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.pages.words import figure, op_figure
 
-PLACE = "<!-- trend --><!-- /trend -->"
-"""Where a page says how its loop did in earlier surveys, which no worker knows."""
+PLACE = "<!-- trend --><!-- /trend -->"  # for what no worker knows
 
 
 @dataclasses.dataclass(frozen=True)
