@@ -13,26 +13,10 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared import searches
 from stiction_ros.cli.shared.as_json import write_json
-from stiction_ros.cli.shared.intake_options import (
-    add_columns,
-    add_intake,
-    intake_options,
-    opened,
-    show_loops,
-    tell,
-)
 from stiction_ros.cli.shared.progress import bar
-from stiction_ros.cli.shared.searches import (
-    add_law,
-    add_search_options,
-    identify_by,
-    input_orders,
-    output_orders,
-    refuse_channel_orders,
-    search_options,
-)
 from stiction_ros.errors import storing
 from stiction_ros.records.parts import longest_part
 from stiction_ros.texts import plural, probability, symbol
@@ -51,18 +35,18 @@ def add(commands: Any) -> None:
         "or of several runs the longest good part is taken.",
     )
     parser.add_argument("record", metavar="RECORD", help="CSV file, other export, or bag")
-    add_columns(parser)
-    add_intake(parser)
+    intake.add_columns(parser)
+    intake.add_intake(parser)
     parser.add_argument(
         "--na",
-        type=output_orders,
+        type=searches.output_orders,
         metavar="N[,N]",
         help="order n_a of the process (default: by BIC); methods of the paper take one order, "
         "or one for each output",
     )
     parser.add_argument(
         "--nb",
-        type=input_orders,
+        type=searches.input_orders,
         metavar="N[,N][/N,N]",
         help="order n_b of the process (default: n_a); methods of the paper take one order, or "
         "one for each valve in a row for each output",
@@ -74,7 +58,7 @@ def add(commands: Any) -> None:
         metavar="LO:HI",
         help="delays to try, samples (0:10)",
     )
-    add_law(parser)
+    searches.add_law(parser)
     parser.add_argument(
         "--kind",
         choices=searches.LOOP_KINDS,
@@ -86,7 +70,7 @@ def add(commands: Any) -> None:
         choices=searches.METHODS,
         help="method of identification (default: evidence)",
     )
-    add_search_options(parser)
+    searches.add_search_options(parser)
     parser.add_argument(
         "--model", metavar="F.loop.yaml", help="write the identified loop as a loop model"
     )
@@ -110,13 +94,13 @@ def delay_range(text: str) -> tuple[int, int]:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     if options.dry_run:
-        return show_loops([Path(options.record)], intake_options(options))
-    loop = opened(options)
+        return intake.show_loops([Path(options.record)], intake.intake_options(options))
+    loop = intake.opened(options)
     record, parts = longest_part(loop.parts), loop.parts
-    chosen = search_options(options)
+    chosen = searches.search_options(options)
     from stiction_ros.identification import IdentificationOptions
 
-    plain = refuse_channel_orders(options, chosen)
+    plain = searches.refuse_channel_orders(options, chosen)
     settings = IdentificationOptions(
         output_order=plain["na"],
         input_order=plain["nb"],
@@ -124,7 +108,7 @@ def run(options: argparse.Namespace) -> int:
         law=options.law,
         kind=options.kind,
     )
-    search = identify_by(options.method, settings, chosen)
+    search = searches.identify_by(options.method, settings, chosen)
     with bar("identifying") as show:
         found = search(record, show)
     if options.model is not None:
@@ -138,7 +122,7 @@ def run(options: argparse.Namespace) -> int:
         if options.why:
             _print_figures(found)
     else:
-        tell(loop)
+        intake.tell(loop)
     if options.out is not None:
         from stiction_ros.report.record.report import report_record
 

@@ -14,14 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from stiction_ros.cli.identify import delay_range
+from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared.as_json import write_json
-from stiction_ros.cli.shared.intake_options import (
-    add_columns,
-    add_intake,
-    intake_options,
-    show_loops,
-    tell_strangers,
-)
 from stiction_ros.cli.shared.searches import add_law
 from stiction_ros.cli.survey_list import print_list
 from stiction_ros.cli.survey_progress import progress
@@ -44,8 +38,8 @@ def add(commands: Any) -> None:
         "list with its reason and stops no other.",
     )
     parser.add_argument("paths", nargs="+", metavar="PATH", help="files and folders of exports")
-    add_columns(parser)
-    add_intake(parser, many=True)
+    intake.add_columns(parser)
+    intake.add_intake(parser, many=True)
     parser.add_argument(
         "--delay", type=delay_range, metavar="LO:HI", help="delays to try, samples (0:10)"
     )
@@ -98,9 +92,9 @@ def run(options: argparse.Namespace) -> int:
     for path in paths:
         if not path.exists():
             raise InputError("there is no such file or folder", where=str(path))
-    intake = intake_options(options)
+    reading = intake.intake_options(options)
     if options.dry_run:
-        return show_loops(paths, intake)
+        return intake.show_loops(paths, reading)
     costs = _costs(options.cost)
     units = {name: unit for _, name, unit in _pairs(options.units)}
     identification = IdentificationOptions(law=options.law)
@@ -113,7 +107,7 @@ def run(options: argparse.Namespace) -> int:
             gain=not options.no_gain,
             pages=options.out is not None,
             units=tuple(units.items()),
-            read_by=repr(intake),
+            read_by=repr(reading),
         ),
         None if options.out is None else Path(options.out),
         options.resume,
@@ -121,10 +115,10 @@ def run(options: argparse.Namespace) -> int:
     )
     earlier = _earlier(options.previous)
     engine = _engine(options)
-    again = loops(paths, intake) if options.engine == LOCAL else None
+    again = loops(paths, reading) if options.engine == LOCAL else None
     try:
         with progress(again) as show:
-            found = survey(loops(paths, intake), plan, engine, show)
+            found = survey(loops(paths, reading), plan, engine, show)
     except KeyboardInterrupt:
         if plan.out is not None:
             print("survey: interrupted; --resume goes on", file=sys.stderr)
@@ -134,8 +128,8 @@ def run(options: argparse.Namespace) -> int:
     )
     there = {entry.name for entry in found.entries}
     for file, names in ((options.cost, costs), (options.units, units)):
-        tell_strangers(file, "loop", [name for name in names if name not in there])
-    tell_strangers(options.tags, "export", strange_files(paths, intake))
+        intake.tell_strangers(file, "loop", [name for name in names if name not in there])
+    intake.tell_strangers(options.tags, "export", strange_files(paths, reading))
     if plan.out is not None:
         _write(found, plan.out, earlier)
     if options.json is not None:

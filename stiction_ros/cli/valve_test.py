@@ -8,15 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.cli.shared.intake_options import (
-    add_columns,
-    add_intake,
-    intake_options,
-    opened,
-    show_loops,
-    tell,
-)
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.errors import InputError, storing
 from stiction_ros.records.parts import longest_part
@@ -41,8 +34,8 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("what", choices=("plan", "judge"), help="what to do")
     parser.add_argument("record", metavar="RECORD|TEST", help="CSV file, other export, or bag")
-    add_columns(parser)
-    add_intake(parser)
+    intake.add_columns(parser)
+    intake.add_intake(parser)
     parser.add_argument(
         "--before", metavar="RECORD", help="judge: the record that the test was planned from"
     )
@@ -60,10 +53,10 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     if options.dry_run:
-        return show_loops([Path(options.record)], intake_options(options))
+        return intake.show_loops([Path(options.record)], intake.intake_options(options))
     limits = _limits(options)
-    loop = opened(options)
-    tell(loop)
+    loop = intake.opened(options)
+    intake.tell(loop)
     if options.what == "plan":
         from stiction_ros.identification.valve_test.plan import first_round
 
@@ -77,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
     before: Facts | None = None
     if options.before is not None:
         given = argparse.Namespace(**(vars(options) | {"record": options.before}))
-        before = _before(longest_part(opened(given).parts), limits)
+        before = _before(longest_part(intake.opened(given).parts), limits)
     record = max(loop.parts, key=len)
     with bar("judging"):
         said = answer(record, before, limits)

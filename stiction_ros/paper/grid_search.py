@@ -16,14 +16,8 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.paper import one_step_result as one_step
 from stiction_ros.paper.equation_error import EquationError, fit_outputs
-from stiction_ros.paper.one_step_result import (
-    Answer,
-    check_record,
-    delay_choices,
-    friction_limits,
-    result,
-)
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification
 from stiction_ros.paper.smoothed_laws import final_smoothing, smooth_law
@@ -58,7 +52,10 @@ def nodes(limit: float, step: float) -> FloatArray:
 
 def count_points(record: Record, options: PaperOptions) -> int:
     """Return the number of grid points of a record, by which a benchmark extrapolates."""
-    sides = np.floor(friction_limits(record, options) / options.grid_step * (1.0 + 1e-12)) + 1.0
+    sides = (
+        np.floor(one_step.friction_limits(record, options) / options.grid_step * (1.0 + 1e-12))
+        + 1.0
+    )
     return int(np.prod([side * (side + 1.0) / 2.0 for side in sides.tolist()]))
 
 
@@ -73,21 +70,21 @@ def identify_by_grid(
     """
     begun = time.perf_counter()
     options = options or PaperOptions(method="grid")
-    orders = check_record(record, options)
+    orders = one_step.check_record(record, options)
     best = search(record, options, orders, progress or (lambda share: None))
     stable = all(fit.largest_root < 1.0 for fit in best.found.fits)
     reason = "" if stable else "the process at the best point is unstable"
-    answer = Answer(
+    answer = one_step.Answer(
         reason, best.friction, best.delays, best.found.squared_error, best.points, best.found
     )
-    return result(record, options, answer, time.perf_counter() - begun)
+    return one_step.result(record, options, answer, time.perf_counter() - begun)
 
 
 def search(
     record: Record, options: PaperOptions, orders: ArxOrders, progress: Progress
 ) -> GridPoint:
     """Return the grid point and delays of lowest mean SE; see :func:`identify_by_grid`."""
-    limits = friction_limits(record, options)
+    limits = one_step.friction_limits(record, options)
     if options.grid_step > limits.max():
         raise InputError(
             f"step {options.grid_step:g} % is coarser than the largest friction {limits.max():g} %",
@@ -101,7 +98,7 @@ def search(
             where="grid_step",
             fix="choose a larger step or a friction limit",
         )
-    choices = delay_choices(record, options, MAX_CHOICES)
+    choices = one_step.delay_choices(record, options, MAX_CHOICES)
     law, hard = smooth_law(options.law), options.grid_law == "hard"
     smoothing = final_smoothing(limits)
     best: GridPoint | None = None

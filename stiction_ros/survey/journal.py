@@ -6,7 +6,6 @@ import hashlib
 import itertools
 import json
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Any
 
 from stiction_ros.errors import InputError
@@ -72,12 +71,7 @@ class Journal:
     def __enter__(self) -> Journal:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._file.close()
 
 

@@ -20,14 +20,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.paper.one_step_result import (
-    Answer,
-    check_record,
-    delay_choices,
-    evaluated,
-    friction_limits,
-    result,
-)
+from stiction_ros.paper import one_step_result as one_step
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.apparent_stiction import apparent_stictions
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
@@ -84,7 +77,7 @@ def identify_by_programme(
     options = options or PaperOptions()
     search = _Search(record, options, progress or (lambda share: None))
     best = search.run()
-    answer = Answer(
+    answer = one_step.Answer(
         "" if best else NO_END,
         best.solution.friction if best else np.zeros((len(record.valves), 2)),
         best.delays if best else search.choices[0],
@@ -92,15 +85,15 @@ def identify_by_programme(
         sum(one.criterion.evaluations for one in search.programmes.values()),
         starts=tuple(search.log),
     )
-    return result(record, options, answer, time.perf_counter() - begun)
+    return one_step.result(record, options, answer, time.perf_counter() - begun)
 
 
 class _Search:
     def __init__(self, record: Record, options: PaperOptions, progress: Progress) -> None:
         self.record, self.options, self.progress = record, options, progress
-        orders = check_record(record, options)
-        self.choices = delay_choices(record, options, MAX_CHOICES)
-        limits = friction_limits(record, options)
+        orders = one_step.check_record(record, options)
+        self.choices = one_step.delay_choices(record, options, MAX_CHOICES)
+        limits = one_step.friction_limits(record, options)
         self.table = StemTable(record, limits, orders, options.law)
         self.programmes = {
             delays: ReducedProgramme(Criterion(self.table, delays)) for delays in self.choices
@@ -177,7 +170,7 @@ class _Search:
     def _solve(self, start: Start, delays: Delays, width: float) -> None:
         start = self._released(start, self.programmes[delays].criterion)
         solution = self.programmes[delays].solve(start.friction, width)
-        fits = evaluated(self.record, self.options, solution.friction, delays).fits
+        fits = one_step.evaluated(self.record, self.options, solution.friction, delays).fits
         stable = max(fit.largest_root for fit in fits) < 1.0
         self._tried[delays] += [start.friction, solution.friction]
         self.ends.append(_End(delays, solution, stable))

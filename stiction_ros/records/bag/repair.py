@@ -10,14 +10,7 @@ from collections import Counter
 from pathlib import Path
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.finish import (
-    FileContent,
-    Packing,
-    content_of,
-    log_time_caps,
-    rewrite,
-    write_listing,
-)
+from stiction_ros.records.bag import finish
 from stiction_ros.records.storage.bag_metadata import BagFile
 from stiction_ros.records.storage.files import METADATA, found_files, listing_notes, refuse_foreign
 from stiction_ros.records.storage.mcap_scan import McapScan
@@ -45,7 +38,7 @@ class Repair:
     notes: tuple[str, ...]  # what was wrong, one sentence each
 
 
-def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noqa: B008 (frozen)
+def repair_bag(path: str | Path, packing: finish.Packing = finish.Packing()) -> Repair:  # noqa: B008 (frozen)
     """Repair a bag, a rosbag2 directory or one ``.mcap`` file, in its place.
 
     A file that was damaged is kept beside the new one, as ``….mcap.damaged``. What the bag
@@ -67,13 +60,13 @@ def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noq
     contents = [_look(file) for file in files]
     notes = [note for content in contents for note in content.notes]
     ill = [content.damaged or not content.finished for content in contents]
-    caps = log_time_caps(files) if any(ill) else [None] * len(files)
+    caps = finish.log_time_caps(files) if any(ill) else [None] * len(files)
     for number, file in enumerate(files):
         if ill[number]:
             contents[number] = _mend(file, contents[number], packing, caps[number])
     listing = _listing_faults(path, contents)
     if path.is_dir() and (any(ill) or listing):
-        write_listing(path, contents)
+        finish.write_listing(path, contents)
     status = RepairStatus.FINISHED if any(ill) or listing else RepairStatus.WHOLE
     if any(content.damaged for content in contents):
         status = RepairStatus.SALVAGED
@@ -86,7 +79,7 @@ def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noq
     )
 
 
-def _look(path: Path) -> FileContent:
+def _look(path: Path) -> finish.FileContent:
     """Return what a file holds, damaged or not."""
     scan = McapScan(path, salvage=True)
     first: int | None = None
@@ -98,17 +91,19 @@ def _look(path: Path) -> FileContent:
     counts: Counter[str] = Counter()
     for channel, topic in scan.topics.items():
         counts[topic.name] += scan.counts[channel]
-    return content_of(BagFile(path.name, dict(counts), first, last), scan)
+    return finish.content_of(BagFile(path.name, dict(counts), first, last), scan)
 
 
-def _mend(path: Path, content: FileContent, packing: Packing, cap: int | None) -> FileContent:
+def _mend(
+    path: Path, content: finish.FileContent, packing: finish.Packing, cap: int | None
+) -> finish.FileContent:
     """Rewrite one file; a damaged one stays beside the new one under another name."""
     if content.damaged:
         shutil.copy2(path, path.with_suffix(".mcap.damaged"))
-    return rewrite(path, packing, cap=cap, salvage=True)
+    return finish.rewrite(path, packing, cap=cap, salvage=True)
 
 
-def _listing_faults(path: Path, contents: list[FileContent]) -> list[str]:
+def _listing_faults(path: Path, contents: list[finish.FileContent]) -> list[str]:
     """Return what is wrong with ``metadata.yaml``; nothing for a single file."""
     if not path.is_dir():
         return []
@@ -120,7 +115,7 @@ def _listing_faults(path: Path, contents: list[FileContent]) -> list[str]:
         return [str(error)]
 
 
-def _counts(contents: list[FileContent]) -> Counter[str]:
+def _counts(contents: list[finish.FileContent]) -> Counter[str]:
     counts: Counter[str] = Counter()
     for content in contents:
         counts.update(content.file.counts)

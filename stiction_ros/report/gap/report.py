@@ -15,16 +15,7 @@ from stiction_ros.discrepancy.gap.measure import levelled
 from stiction_ros.effects import FloatArray
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import KINDS, SCRIPT, Curve, against, over_time
-from stiction_ros.report.gap.words import (
-    CONTROLLER,
-    called,
-    candidate_of,
-    figures_with_units,
-    named_figures,
-    place_of,
-    plain,
-    word_of,
-)
+from stiction_ros.report.gap import words as say
 from stiction_ros.report.page import Cell, card, folded, number, table
 from stiction_ros.signals.holds import stretches
 
@@ -86,15 +77,15 @@ def _headline(found: Discrepancy) -> str:
     if not names and not found.alternatives and found.process_changes:
         return f"The process is another than the model: {'; '.join(change_lines(found))}"
     if not names:
-        names = [" or ".join(called(*name) for name in found.alternatives)]
+        names = [" or ".join(say.called(*name) for name in found.alternatives)]
     return _HEADLINES[found.verdict].format(what=", and ".join(names))
 
 
 def _called(effect: FoundEffect) -> str:
-    named = called(effect.place, effect.effect)
+    named = say.called(effect.place, effect.effect)
     if not effect.alternatives:
         return named
-    return f"{named} (or {' or '.join(called(*name) for name in effect.alternatives)})"
+    return f"{named} (or {' or '.join(say.called(*name) for name in effect.alternatives)})"
 
 
 def _decides(found: Discrepancy) -> list[str]:
@@ -140,7 +131,7 @@ def _gate(found: Discrepancy) -> str:
     if gate.set_point_moves is not None:
         moves = ", ".join(map(str, gate.set_point_moves))
         lines.append(f"set-point moves: {moves}")
-    lines.append(CONTROLLER[found.controller.status])
+    lines.append(say.CONTROLLER[found.controller.status])
     lines += found.notes
     return _listed(lines)
 
@@ -165,20 +156,20 @@ def _gaps(found: Discrepancy) -> str:
 
 
 def _look(found: Discrepancy, look: Look, k: int) -> list[str]:
-    listed = "".join(f"<li>{text(plain(said))}</li>" for said in look.where.sentences)
+    listed = "".join(f"<li>{text(say.plain(said))}</li>" for said in look.where.sentences)
     rows: list[list[Cell]] = []
     for fit in look.scores.fits:
         outside = "" if fit.candidate.inside else ", outside the catalogue"
         rows.append(
             [
-                candidate_of(fit) + outside,
-                named_figures(found, fit),
+                say.candidate_of(fit) + outside,
+                say.named_figures(found, fit),
                 number(fit.delta_bic),
                 number(round(fit.held_gain, 3) + 0.0),
             ]
         )
     head = ("candidate", "figures", "BIC gained", "held-out gain")
-    said = plain(f"{look.decision.verdict}: {look.decision.reason}")
+    said = say.plain(f"{look.decision.verdict}: {look.decision.reason}")
     after = "it stays in the model" if look.kept else look.reason
     if not after or after == look.decision.reason:
         after = "nothing is added"
@@ -187,7 +178,7 @@ def _look(found: Discrepancy, look: Look, k: int) -> list[str]:
         f"<ul>{listed}</ul>" if listed else "<p>At no particular time or place.</p>",
         _tracks(found, look),
         f"<h2>Look {k + 1}: the candidates</h2>",
-        f"<p>{text(said)}; {text(plain(after))}.</p>",
+        f"<p>{text(said)}; {text(say.plain(after))}.</p>",
         f"<p class='soft'>{CANDIDATES}</p>",
         table(head, rows, texts=2),
     ]
@@ -196,7 +187,9 @@ def _look(found: Discrepancy, look: Look, k: int) -> list[str]:
 def _untestable(found: Discrepancy) -> str:
     if not found.untestable:
         return "<p>Every effect of the catalogue would have been seen.</p>"
-    rows = [[called(t.place, t.effect), t.experiment, number(t.expected)] for t in found.untestable]
+    rows = [
+        [say.called(t.place, t.effect), t.experiment, number(t.expected)] for t in found.untestable
+    ]
     return table(("effect", "what would help", "BIC expected"), rows, texts=2)
 
 
@@ -239,7 +232,7 @@ def _tracks(found: Discrepancy, look: Look) -> str:
     if not look.where.tracks or look.where.tracks[0].gain <= 0.0:
         return ""
     track = look.where.tracks[0]
-    place, curve = plain(track.place), Curve("disturbance", "free", track.wave)
+    place, curve = say.plain(track.place), Curve("disturbance", "free", track.wave)
     driver, label = _driver(found, look, track.place)
     time = np.arange(float(len(found.runs))) * found.runs.sample_time
     return over_time(
@@ -269,9 +262,9 @@ WINDOW = 400  # samples that are drawn, where an effect moves PV most
 
 def effect_card(effect: FoundEffect) -> str:
     """Return the box of one effect: place, law, figures with units, and why it."""
-    lines = figures_with_units(effect)
+    lines = say.figures_with_units(effect)
     if effect.alternatives:
-        others = " or ".join(called(*name) for name in effect.alternatives)
+        others = " or ".join(say.called(*name) for name in effect.alternatives)
         lines.append(f"or {others}: these records do not tell them apart")
     if np.isfinite(effect.closed):
         lines.append(f"closes {100.0 * effect.closed:.0f} % of the gap by itself")
@@ -279,7 +272,9 @@ def effect_card(effect: FoundEffect) -> str:
         lines.append(f"{effect.sentence}.")
     kind = "bad" if effect.verdict is GapVerdict.NAMED else "open"
     law = "" if effect.law is None else f" (law {effect.law})"
-    return card(kind, place_of(effect.place), word_of(effect.effect) + law, "\n".join(lines))
+    return card(
+        kind, say.place_of(effect.place), say.word_of(effect.effect) + law, "\n".join(lines)
+    )
 
 
 def effect_figure(found: Discrepancy, effect: FoundEffect) -> str:
@@ -294,7 +289,7 @@ def effect_figure(found: Discrepancy, effect: FoundEffect) -> str:
     pv = base.run.runs.pv[rows, i]
     with_it = np.where(scored[rows, i], pv - base.noise[i].residual[rows], np.nan)
     return over_time(
-        f"What it does: {called(effect.place, effect.effect)}, in the {rows.stop - rows.start} "
+        f"What it does: {say.called(effect.place, effect.effect)}, in the {rows.stop - rows.start} "
         f"samples in which it moves {name} most. Both free runs are driven by the recorded OP "
         "alone.",
         np.arange(float(rows.start), rows.stop) * found.runs.sample_time,
@@ -319,7 +314,7 @@ def _liveliest(moves: np.ndarray[tuple[int], np.dtype[np.float64]]) -> slice:
 def preview_figures(preview: Preview) -> str:
     """Return what each rival would show in the experiment that decides."""
     time = np.arange(float(len(preview.op))) * preview.sample_time
-    rivals = [(called(rival.place, rival.effect), rival) for rival in preview.rivals]
+    rivals = [(say.called(rival.place, rival.effect), rival) for rival in preview.rivals]
     signals = {
         "stem": "stem (%)",
         "pv": f"{preview.output} as the sensor shows it",
