@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import asyncio
 import datetime
 import sys
 from pathlib import Path
@@ -63,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
             path = out / "raw" / f"{loop.loop}_{len(files) + 1}.txt"
             files.setdefault(tag, HistoryFile(path))
     with bar("reading history") as show:
-        fetch(options.url, credentials, files, span, show)
+        asyncio.run(fetch(options.url, credentials, files, span, show))
     for loop in loops:
         record = record_of(loop, files, span)
         target = out / f"{loop.loop}.csv"

@@ -135,7 +135,7 @@ def _shown(reading: TagReading) -> str:
     return json.dumps(reading.value) if isinstance(reading.value, str) else repr(reading.number)
 
 
-def fetch(
+async def fetch(
     url: str,
     credentials: Credentials,
     files: dict[str, HistoryFile],
@@ -147,16 +147,6 @@ def fetch(
     Raises:
         InputError: the server cannot be reached, refuses, or keeps no history of a tag.
     """
-    asyncio.run(_fetch(url, credentials, files, span, progress))
-
-
-async def _fetch(
-    url: str,
-    credentials: Credentials,
-    files: dict[str, HistoryFile],
-    span: Span,
-    progress: Callable[[float], None],
-) -> None:
     from asyncua import ua
 
     from stiction_ros.opcua.session import describe

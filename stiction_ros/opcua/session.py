@@ -12,15 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stiction_ros.errors import InputError
+from stiction_ros.opcua import security
 from stiction_ros.opcua.loop_bridge import MODE_REFUSES, WriteOrder, mode_text
 from stiction_ros.opcua.reading import TagQuality, TagReading, quality_of
-from stiction_ros.opcua.security import (
-    CLIENT_URI,
-    Credentials,
-    check_dates,
-    fingerprint,
-    load_certificate,
-)
 
 if TYPE_CHECKING:
     from asyncua import Client, ua
@@ -37,7 +31,7 @@ SAID = {
 EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 
 
-async def open_client(url: str, credentials: Credentials) -> Client:
+async def open_client(url: str, credentials: security.Credentials) -> Client:
     """Return a client with an active session, as the credentials ask for.
 
     Raises:
@@ -50,11 +44,11 @@ async def open_client(url: str, credentials: Credentials) -> Client:
 
     logging.getLogger("asyncua").setLevel(logging.CRITICAL)
     client = Client(url, timeout=ANSWER, watchdog_intervall=PROBE)
-    client.application_uri = CLIENT_URI
+    client.application_uri = security.CLIENT_URI
     client.name = client.description = "stiction_ros"
     if credentials.security != "none":
         for path in (credentials.certificate, credentials.server_certificate):
-            check_dates(load_certificate(Path(path)), path)
+            security.check_dates(security.load_certificate(Path(path)), path)
         await client.set_security(
             SecurityPolicyBasic256Sha256,
             certificate=Path(credentials.certificate),
@@ -103,9 +97,11 @@ async def _compare(url: str, pinned: Path) -> None:
         shown = await shown_certificate(url)
     except (OSError, TimeoutError, ua.UaError):
         return  # it does not tell
-    if shown is not None and fingerprint(shown) != fingerprint(load_certificate(pinned)):
+    if shown is not None and security.fingerprint(shown) != security.fingerprint(
+        security.load_certificate(pinned)
+    ):
         raise InputError(
-            f"is not what the server shows now ({fingerprint(shown)[:23]}…)",
+            f"is not what the server shows now ({security.fingerprint(shown)[:23]}…)",
             where=str(pinned),
             fix="ask the control engineer, then pin it again",
         )

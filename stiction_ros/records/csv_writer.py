@@ -12,14 +12,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError, storing
-from stiction_ros.records.csv_names import (
-    DEFAULT_OUTPUT,
-    DEFAULT_VALVE,
-    MODE,
-    QUALITY,
-    SIGNALS,
-    column_name,
-)
+from stiction_ros.records import csv_names
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 
@@ -58,22 +51,25 @@ def write_csv(
             where=record.name,
             fix="write each of its segments by itself",
         )
-    plain = (record.valves, record.outputs) == ((DEFAULT_VALVE,), (DEFAULT_OUTPUT,))
+    plain = (record.valves, record.outputs) == (
+        (csv_names.DEFAULT_VALVE,),
+        (csv_names.DEFAULT_OUTPUT,),
+    )
     times = _iso(record) if iso else [repr(t) for t in (record.start + record.time).tolist()]
     header, columns = ["t"], [times]
-    for key, name in SIGNALS.items():
+    for key, name in csv_names.SIGNALS.items():
         values: FloatArray | None = getattr(record, key)
         if values is None:
             continue
         tags = record.valves if key in ("op", "stem") else record.outputs
         for tag, column in zip(tags, values.T, strict=True):
-            header.append(name if plain else column_name(key, tag))
+            header.append(name if plain else csv_names.column_name(key, tag))
             columns.append(["" if math.isnan(x) else repr(x) for x in column.tolist()])
     if modes is not None:
-        header.append(MODE)
+        header.append(csv_names.MODE)
         columns.append(list(modes))
     if record.mask is not None:
-        header.append(QUALITY)
+        header.append(csv_names.QUALITY)
         columns.append([Quality(number).word for number in record.mask.tolist()])
     with storing(path), Path(path).open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")

@@ -14,16 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.errors import InputError
+from stiction_ros.intake.sheets import layout as tops
 from stiction_ros.intake.sheets import text
 from stiction_ros.intake.sheets.cells import Cells, is_number
-from stiction_ros.intake.sheets.layout import (
-    LOOKED_AT,
-    SPACE,
-    Layout,
-    delimiter_of,
-    layout_of,
-    spaced,
-)
 from stiction_ros.intake.sheets.names import OR_ROW, folded
 from stiction_ros.intake.sheets.stamps import is_stamp
 
@@ -41,7 +34,7 @@ class Sheet(abc.ABC):
 
     path: Path  # of the file
     name: str  # of the table: the file's, and the sheet's of a workbook that has several
-    layout: Layout  # header, units, where data begin
+    layout: tops.Layout  # header, units, where data begin
     decimal_comma: bool = False  # whether a comma alone in a number is the decimal one
     header_once: bool = False  # whether no row of data may be taken for the header that returns
     row_word: str = "line"  # what a row is called in errors
@@ -93,10 +86,10 @@ class RowSheet(Sheet):
         self.path, self.name, self._rows = path, name, rows
         with rows() as opened:
             filled = (cells for _, cells in opened if any(cell.strip() for cell in cells))
-            top = list(itertools.islice(filled, LOOKED_AT))
+            top = list(itertools.islice(filled, tops.LOOKED_AT))
         if not top:
             raise InputError("is empty", fix="give a CSV file with a header")
-        self.layout = layout_of(top)
+        self.layout = tops.layout_of(top)
         if not self.layout.header or all(is_number(cell) for cell in self.layout.header):
             names = (delimiter or ",").join(
                 ("OP", "PV") if len(top[0]) < 3 else ("t", "OP", "PV", "SP")[: len(top[0])]
@@ -188,14 +181,14 @@ def _plain(cell: str) -> str:
 def text_sheet(path: Path) -> Sheet:
     """Open a text file; comma, semicolon, tab, bar or white space between the cells."""
     with text.open_text(path) as opened:
-        lines = [line for line in itertools.islice(opened, LOOKED_AT) if line.strip()]
-    delimiter = delimiter_of(lines)
+        lines = [line for line in itertools.islice(opened, tops.LOOKED_AT) if line.strip()]
+    delimiter = tops.delimiter_of(lines)
 
     @contextlib.contextmanager
     def rows() -> Iterator[Iterator[tuple[int, list[str]]]]:
         with text.open_text(path) as opened:
-            if delimiter == SPACE:
-                yield ((line, spaced(row)) for line, row in enumerate(opened, start=1))
+            if delimiter == tops.SPACE:
+                yield ((line, tops.spaced(row)) for line, row in enumerate(opened, start=1))
                 return
             reader = csv.reader(opened, delimiter=delimiter)
             try:

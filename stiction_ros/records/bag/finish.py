@@ -12,13 +12,7 @@ from mcap.writer import CompressionType, Writer
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.run_metadata import RUN, custom_data, merged
-from stiction_ros.records.storage.bag_metadata import (
-    BagFile,
-    BagTopic,
-    bag_information,
-    metadata_record,
-    metadata_yaml,
-)
+from stiction_ros.records.storage import bag_metadata as metadata
 from stiction_ros.records.storage.files import METADATA, found_files
 from stiction_ros.records.storage.log_time import SIMULATED
 from stiction_ros.records.storage.mcap_scan import McapScan
@@ -51,8 +45,8 @@ class Packing:
 class FileContent:
     """What one storage file holds."""
 
-    file: BagFile  # its name, counts and times
-    topics: tuple[BagTopic, ...]  # in the order they were announced
+    file: metadata.BagFile  # its name, counts and times
+    topics: tuple[metadata.BagTopic, ...]  # in the order they were announced
     run: Mapping[str, str]  # what its metadata records say of the run
     finished: bool  # whether its writer closed it
     damaged: bool  # whether something in it is broken
@@ -134,7 +128,7 @@ def rewrite(
             for name, mapping in scan.metadata:
                 if name not in (RUN, ROSBAG2):
                     target.add_metadata(name, mapping)
-            target.add_metadata(ROSBAG2, metadata_record(_information([content])))
+            target.add_metadata(ROSBAG2, metadata.metadata_record(_information([content])))
             target.finish()  # type: ignore[no-untyped-call]
             output.flush()
             os.fsync(output.fileno())
@@ -146,7 +140,7 @@ def rewrite(
 
 def write_listing(directory: Path, contents: Sequence[FileContent]) -> None:
     """Write ``metadata.yaml`` for the files of a bag, one at least, in their order."""
-    text = metadata_yaml(_information(contents))
+    text = metadata.metadata_yaml(_information(contents))
     partial = directory / f"{METADATA}.part"
     with partial.open("w", encoding="utf-8") as stream:
         stream.write(text)
@@ -155,10 +149,10 @@ def write_listing(directory: Path, contents: Sequence[FileContent]) -> None:
     os.replace(partial, directory / METADATA)  # a reader sees the old one or the new one
 
 
-def _copy(scan: McapScan, target: Writer, cap: int | None) -> BagFile:
+def _copy(scan: McapScan, target: Writer, cap: int | None) -> metadata.BagFile:
     """Copy all messages and topics; return what was written."""
     schemas: dict[tuple[str, str, str], int] = {}
-    channels: dict[BagTopic, int] = {}
+    channels: dict[metadata.BagTopic, int] = {}
     counts: Counter[str] = Counter()
     first: int | None = None
     last: int | None = None
@@ -189,10 +183,10 @@ def _copy(scan: McapScan, target: Writer, cap: int | None) -> BagFile:
         first = log_time if first is None else min(first, log_time)
         last = log_time if last is None else max(last, log_time)
     announce()
-    return BagFile(scan.path.name, counts, first, last)
+    return metadata.BagFile(scan.path.name, counts, first, last)
 
 
-def content_of(file: BagFile, scan: McapScan) -> FileContent:
+def content_of(file: metadata.BagFile, scan: McapScan) -> FileContent:
     """Return what a file holds after a scan of all its messages."""
     topics = tuple(scan.topics.values())
     run = merged(scan.metadata)
@@ -200,11 +194,11 @@ def content_of(file: BagFile, scan: McapScan) -> FileContent:
 
 
 def _information(contents: Sequence[FileContent]) -> dict[str, object]:
-    topics: dict[str, BagTopic] = {}
+    topics: dict[str, metadata.BagTopic] = {}
     run: dict[str, str] = {}
     for content in contents:
         run.update(content.run)
         for topic in content.topics:
             topics.setdefault(topic.name, topic)
     files = [content.file for content in contents]
-    return bag_information(files, list(topics.values()), custom=custom_data(run))
+    return metadata.bag_information(files, list(topics.values()), custom=custom_data(run))

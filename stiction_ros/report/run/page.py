@@ -10,14 +10,8 @@ from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.events import ModeChange
 from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.page import Cell, count, duration, folded, interval, number, percent, table
+from stiction_ros.report.run import identified
 from stiction_ros.report.run.figures import draw_run
-from stiction_ros.report.run.identified import (
-    KINDS,
-    has_friction,
-    process_table,
-    valve_cards,
-    verdict_line,
-)
 from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import Story
 from stiction_ros.report.run.summary import measured, messages
@@ -44,13 +38,13 @@ def run_page(story: Story) -> str:
         f'<p class="soft">Loop {text(story.name)}: {text(kicker)}</p>',
         _trouble(story),
         *[f'<p class="lead">{words(line)}</p>' for line in findings(story)],
-        valve_cards(story.identified.get("valves", []), story),
+        identified.valve_cards(story.identified.get("valves", []), story),
         _gain(story),
         _work(story),
         *draw_run(story),
         _fits(story),
         monitor_section(story.log),
-        process_table(story.identified.get("outputs", []), record.sample_time),
+        identified.process_table(story.identified.get("outputs", []), record.sample_time),
         _messages(story),
         _configuration(story),
         _notes(story),
@@ -61,8 +55,8 @@ def run_page(story: Story) -> str:
 def headline(story: Story) -> str:
     """Return the answer in one line: which valve, and what became of it."""
     verdicts = story.identified.get("valves", [])
-    line = verdict_line(verdicts)
-    if not any(map(has_friction, verdicts)):
+    line = identified.verdict_line(verdicts)
+    if not any(map(identified.has_friction, verdicts)):
         return line
     if story.log.swap is None:
         return f"{line}; the controller was not swapped"
@@ -113,7 +107,7 @@ def _later_changes(story: Story, swap: ModeChange) -> list[str]:
 
 def _trouble(story: Story) -> str:
     found = story.phases
-    stuck = any(map(has_friction, story.identified.get("valves", [])))
+    stuck = any(map(identified.has_friction, story.identified.get("valves", [])))
     if found.status is PhaseStatus.OK or (story.log.swap is None and not stuck):
         return ""
     return f'<p class="note warn">No comparison of before and after: {text(found.reason)}.</p>'
@@ -235,7 +229,7 @@ def _fits(story: Story) -> str:
                 [
                     duration(log.seconds(fit.stamp)),
                     name,
-                    (KINDS.get(verdict, ""), verdict),
+                    (identified.KINDS.get(verdict, ""), verdict),
                     percent(valve["f_s"]),
                     interval(valve["f_s_interval"]),
                     percent(valve["f_d"]),

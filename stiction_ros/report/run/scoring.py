@@ -26,14 +26,8 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records import Record
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.valve_work import ValveWork, largest_op_step, work_per_hour
+from stiction_ros.signals import oscillation
 from stiction_ros.signals.holds import holds
-from stiction_ros.signals.oscillation import (
-    LEAST_LINE,
-    NEEDED_CYCLES,
-    Cycle,
-    amplitude,
-    dominant_cycle,
-)
 
 OFFSET_SAMPLES = 50
 NOISE_SHARE = float(np.sqrt(2 / np.pi))  # E|v| of white noise with σ = 1
@@ -81,7 +75,7 @@ class Phases:
 
     status: PhaseStatus  # ok, or why the two cannot be compared
     reason: str  # one sentence; empty when ok
-    cycle: Cycle | None  # of ``before``, None when it could not be looked for
+    cycle: oscillation.Cycle | None  # of ``before``, None when it could not be looked for
     before: Phase | None  # before, after: None where there is no whole round
     after: Phase | None
 
@@ -125,7 +119,7 @@ def score(
         last,
         {
             name: Score(
-                None if period is None else amplitude(error[:, j], stretches, period),
+                None if period is None else oscillation.amplitude(error[:, j], stretches, period),
                 offset(error[:, j], stretches),
                 iae_per_hour(error[there, j], noise_std[j]),
             )
@@ -181,7 +175,7 @@ def phases(
     if _gap(record, *spans[:2]):
         reason = "the record has a gap in the last round of set-points before the swap"
         return Phases(PhaseStatus.NO_ROUND, reason, None, None, None)
-    cycle = dominant_cycle(*errors(record.part(spans[0], spans[1])))
+    cycle = oscillation.dominant_cycle(*errors(record.part(spans[0], spans[1])))
     period = None if cycle is None else cycle.period
     before = score(record, spans[0], spans[1], period, sigma)
     if spans[3] > len(record):
@@ -206,7 +200,7 @@ def _unswapped(record: Record, round_samples: int | None, sigma: Sequence[float]
     if _gap(record, first, last):
         reason += ", and most of its last round of set-points is missing in the record"
         return Phases(PhaseStatus.NO_SWAP, reason, None, None, None)
-    cycle = dominant_cycle(*errors(record.part(first, last)))
+    cycle = oscillation.dominant_cycle(*errors(record.part(first, last)))
     before = score(record, first, last, None if cycle is None else cycle.period, sigma)
     return Phases(PhaseStatus.NO_SWAP, reason, cycle, before, None)
 
@@ -217,13 +211,13 @@ def _gap(record: Record, first: int, last: int) -> bool:
     return bool(missing.mean() > MOST_MISSING)
 
 
-def _no_cycle(cycle: Cycle | None) -> str:
+def _no_cycle(cycle: oscillation.Cycle | None) -> str:
     """Return why there is no limit cycle to judge by; empty when there is one."""
-    if cycle is None or cycle.share < LEAST_LINE:
+    if cycle is None or cycle.share < oscillation.LEAST_LINE:
         return "the loop did not cycle in the last round of set-points before the swap"
-    if cycle.count < NEEDED_CYCLES:
+    if cycle.count < oscillation.NEEDED_CYCLES:
         return (
             f"the loop made {cycle.count} whole cycles in the last round of set-points before "
-            f"the swap, at least {NEEDED_CYCLES} are needed"
+            f"the swap, at least {oscillation.NEEDED_CYCLES} are needed"
         )
     return ""
