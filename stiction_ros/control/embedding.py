@@ -99,12 +99,9 @@ class EmbeddingMpc(Formulation):
         tuning: EmbeddingTuning,
         spreads: Sequence[FrictionSpread | None] | None = None,
     ) -> None:
-        """Factorise one problem per combination of patterns.
+        """Factorise one problem per combination of patterns, for up to three sticky valves.
 
         What a jump costs goes by the frictions that are known now.
-
-        Raises:
-            InputError: no sticky valve, more than three, or a law without a jump form.
         """
         self.limits, self.tuning = limits, tuning
         self._sticky = [j for j, friction in enumerate(frictions) if friction is not None]
@@ -153,12 +150,10 @@ class EmbeddingMpc(Formulation):
         spreads: Sequence[FrictionSpread | None] | None = None,
         interval: FloatArray | None = None,
     ) -> None:
-        """Set what is known of the valves for the plans from now on.
+        """Set what is known of the m valves for the plans from now on.
 
-        Args:
-            forms: jump form of each of the m valves; None for the healthy ones, as before.
-            spreads: half-widths of the intervals of the frictions, None where unknown.
-            interval: lowest and highest stem position, shape (m, 2), %; None when sure.
+        ``interval`` are lowest and highest stem positions, shape (m, 2), %; None when sure. Healthy
+        valves stay healthy.
         """
         tuning = self.tuning
         self.forms = tuple(forms)

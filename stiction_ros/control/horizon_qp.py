@@ -172,7 +172,9 @@ class HorizonQp:
         if (lower > upper).any():
             return None
         if self.size == 0:
-            return self._only_plan(state, offset, base, target_pv)
+            plan = offset.reshape(self.cost.horizon, -1)  # nothing is left to decide
+            slack = self.slack(state, plan, target_pv)
+            return HorizonSolution(plan, base + self.slack_cost(slack), slack, np.zeros(0))
         self._hard.lower[:], self._hard.upper[:] = lower, upper
         found = self._solved(self._hard, linear)
         if found is None:
@@ -213,14 +215,6 @@ class HorizonQp:
         self._fill_bounds(state, np.zeros(len(self.shape)), lower, upper, target_pv)
         soft = self._soft
         return QpData(soft.hessian, linear, soft.matrix, soft.lower, soft.upper)
-
-    def _only_plan(
-        self, state: FloatArray, offset: FloatArray, cost: float, target_pv: FloatArray
-    ) -> HorizonSolution:
-        """Return the plan of a pattern that leaves nothing to decide."""
-        plan = offset.reshape(self.cost.horizon, -1)
-        slack = self.slack(state, plan, target_pv)
-        return HorizonSolution(plan, cost + self.slack_cost(slack), slack, np.zeros(0))
 
     def slack(self, state: FloatArray, plan: FloatArray, target_pv: FloatArray) -> FloatArray:
         """Return by how much ``plan`` (N, m) breaks the soft bounds, shape (p,)."""

@@ -42,10 +42,8 @@ class TargetSelector:
     def __init__(self, model: LinearModel, weights: FloatArray, limits: FloatArray) -> None:
         """Prepare for ``weights`` (p,) on the outputs and ``limits`` (m, 2) on the stems.
 
-        The attribute ``limits`` may be replaced later, as by a valve that cannot move.
-
-        Raises:
-            InputError: the model has no steady state that its valves can move.
+        The attribute ``limits`` may be replaced, as by a valve that cannot move. A model without a
+        steady state that its valves can move is refused.
         """
         self.model = model
         self.limits = limits

@@ -25,9 +25,6 @@ def random_binary(
 
     Each valve starts at either of two ``levels`` with equal chance and changes to the other with
     ``switch_probability`` at every further sample, as in Appendix A.
-
-    Raises:
-        InputError: a value out of range.
     """
     if samples < 1 or valves < 1:
         raise InputError(f"{samples} samples of {valves} valves", where="samples", fix="use 1 up")

@@ -226,9 +226,6 @@ def record_of(tags: LoopTags, files: dict[str, HistoryFile], span: Span) -> Reco
     PV and SP of a sample are the last values with stamps up to it (and a jitter of a tenth of a
     sample), OP is the last up to its middle. The grid begins with the first value of each PV;
     samples with a bad value are marked so.
-
-    Raises:
-        InputError: a tag without values, or more than 10 million samples.
     """
     jitter, half = tags.sample_ns // JITTER, tags.sample_ns // 2
     pv = [files[output.pv].read() for output in tags.outputs]

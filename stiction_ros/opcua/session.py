@@ -36,8 +36,7 @@ async def open_client(url: str, credentials: security.Credentials) -> Client:
 
     Raises:
         InputError: files that cannot be used, or certificates that have expired.
-        OSError, TimeoutError, asyncua.ua.UaError: the server cannot be reached, or refuses; so for
-            whatever asks the server.
+        OSError, TimeoutError, asyncua.ua.UaError: as whatever asks the server.
     """
     from asyncua import Client, ua
     from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256

@@ -26,14 +26,7 @@ class EquationError:
 def fit_outputs(
     pv: FloatArray, stems: FloatArray, delays: Delays, orders: ArxOrders
 ) -> EquationError:
-    """Fit every output.
-
-    Args:
-        pv: shape (N, p), engineering units.
-        stems: shape (m, N), %.
-        delays: for each output the t_d of each valve, samples.
-        orders: n_a, n_b, ε.
-    """
+    """Fit every output: PV, shape (N, p), of stems, shape (m, N), %, with t_d of each valve."""
     fits = tuple(
         fit_arx(y, stems, row, orders, orders.kept(i, len(stems)))
         for i, (y, row) in enumerate(zip(pv.T, delays, strict=True))

@@ -17,11 +17,8 @@ def identify(
 ) -> PaperIdentification:
     """Identify friction and linear dynamics as the paper does; see :class:`PaperOptions`.
 
-    Returns:
-        Point estimates without verdict or interval; ``search`` tells what was tried.
-
-    Raises:
-        InputError: a record that no model can be fitted to, or OP and PV clearly swapped.
+    They are point estimates without verdict or interval; ``search`` tells the way. A record that
+    no model can be fitted to, or with OP and PV clearly swapped, is refused.
     """
     options = options or PaperOptions()
     if options.check_columns:

@@ -82,13 +82,9 @@ class Plan:
 def survey(
     loops: Iterable[Loop], plan: Plan, engine: Engine, progress: Progress | None = None
 ) -> Survey:
-    """Judge every loop and rank them.
+    """Judge every loop and rank them; the engine is closed at the end, whatever happens.
 
-    Args:
-        loops: drawn one after the other, no faster than the engine takes them.
-        plan: how.
-        engine: where; it is closed at the end, whatever happens.
-        progress: called after each loop.
+    Loops are drawn one after the other, no faster than the engine takes them.
     """
     if plan.out is None:
         if plan.resume:

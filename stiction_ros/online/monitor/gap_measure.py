@@ -111,14 +111,8 @@ def look_at(
 
     .. math:: s_1^2 / s_0^2 \sim F(\nu_1, \nu_0), \quad \nu_1 = \nu_0 n_1 / n_0
 
-    Args:
-        model: the loop as it is known.
-        record: the window.
-        known: what :func:`baseline_of` gives for the same model.
-        chance: that the limit of any output is exceeded in a window of a healthy loop.
-
-    Raises:
-        InputError: as :func:`baseline_of`.
+    The ``chance`` is that a window of a healthy loop exceeds the limit of any output; ``known``
+    is what :func:`baseline_of` gives for the same model, and so are its errors.
     """
     from scipy.stats import f as fisher
 

@@ -82,13 +82,10 @@ class Monitoring:
         given: LoopModel | None = None,
         submit: Submit = run_here,
     ) -> None:
-        """Start with the given model, or with none.
+        """Start with the given model, or with none; that of another loop fails each measurement.
 
-        Args:
-            rule: when the gap has grown.
-            live: the estimator whose samples and fits it shares.
-            given: the model to compare with; that of another loop shows as failed measurements.
-            submit: runs a function with its arguments, here or in another process, in order.
+        The estimator ``live`` shares samples and fits; ``submit`` runs a function with arguments,
+        here or in another process, in order.
         """
         self._live, self._given, self._submit = live, given, submit
         self.monitor = GapMonitor(rule, live.loop, live.valves, live.outputs, live.sample_time)

@@ -61,11 +61,8 @@ def replay_controller(
 ) -> ReplayedControl:
     """Step the controller over the recorded ``pv``, ``op_applied``, ``sp`` and ``dv``.
 
-    Args:
-        bag: the recorded run.
-        settings, model: as the node had them.
-        offers: loop models of the estimator in their order.
-        origin: stamp of sample 0 of the run, ns.
+    Settings and model are those of the node, ``offers`` loop models in order; ``origin`` is the
+    stamp of sample 0 of the run, ns.
     """
     live = ValveTestingController(settings, model)
     recorded = _by_stamp(bag, "op", model.valve_names)

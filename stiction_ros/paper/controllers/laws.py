@@ -45,12 +45,8 @@ def smoothed_stem(
 ) -> tuple[Any, Any]:
     """Return the next stem and direction of motion by the smoothed law of ``friction``.
 
-    Args:
-        friction: names the law.
-        before: the stem, the OP and the direction one sample ago.
-        op: u_k.
-        figures: f_S, f_D and τ.
-        tanh: of numbers or of CasADi expressions, as the other arguments are.
+    ``before`` are stem, OP and direction one sample ago, ``figures`` f_S, f_D and τ; all are
+    numbers or CasADi expressions, as ``tanh`` takes them.
     """
     if directed(friction):
         found: tuple[Any, Any] = kano_step(before, op, figures, tanh)

@@ -65,13 +65,7 @@ def identify_by_programme(
 ) -> PaperIdentification:
     """Identify by the nonlinear programme (12); see the module for the order of work.
 
-    Returns:
-        Point estimates without a verdict, and in ``search`` every run with its end. Its
-        status is ``no_model`` when no run ended feasible with a stable process.
-
-    Raises:
-        InputError: a record that no model can be fitted to, or more than ``MAX_CHOICES``
-            choices of delays.
+    The status is ``no_model`` when no run ended feasible with a stable process.
     """
     begun = time.perf_counter()
     options = options or PaperOptions()

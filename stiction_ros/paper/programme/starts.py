@@ -65,13 +65,9 @@ def inside(limit: float, count: int) -> FloatArray:
 
 
 def around(friction: FloatArray, limits: FloatArray, reach: float, count: int) -> list[FloatArray]:
-    """Return ``count`` points about each valve's friction, the others held, each of shape (m, 2).
+    """Return up to ``count`` points about each valve's friction, others held, (m, 2) each.
 
-    Args:
-        friction: rows (f_S, f_D), shape (m, 2), %.
-        limits: f_max per valve, shape (m,), %.
-        reach: how far J = f_S − f_D and f_S + f_D may go, share of f_max.
-        count: points per valve; those outside the triangle are left out.
+    J = f_S − f_D and f_S + f_D go as far as ``reach``, a share of f_max.
     """
     found = []
     moves = 2.0 * ((0.5 + np.arange(1, count + 1)[:, None] * EVEN) % 1.0) - 1.0
@@ -110,10 +106,8 @@ def draw_starts(limits: FloatArray, stictions: FloatArray, count: int) -> tuple[
 def candidates(limits: FloatArray, stictions: FloatArray, count: int) -> tuple[Start, ...]:
     """Return points to choose starts from: one valve has friction, the others have none.
 
-    Args:
-        limits: f_max per valve, shape (m,), %.
-        stictions: S_0 per valve, shape (m,), %; 0 where no ellipse was found.
-        count: points inside the widest triangle; the others have as many for their area.
+    S_0, %, is 0 without an ellipse; ``count`` points lie inside the widest triangle, as many
+    for their area in the others.
     """
     found = [Start(StartKind.BORDER, np.zeros((len(limits), 2)))]
     for j, (limit, stiction) in enumerate(zip(limits.tolist(), stictions.tolist(), strict=True)):

@@ -62,8 +62,10 @@ def repair_bag(path: str | Path, packing: finish.Packing = finish.Packing()) -> 
     ill = [content.damaged or not content.finished for content in contents]
     caps = finish.log_time_caps(files) if any(ill) else [None] * len(files)
     for number, file in enumerate(files):
+        if contents[number].damaged:
+            shutil.copy2(file, file.with_suffix(".mcap.damaged"))
         if ill[number]:
-            contents[number] = _mend(file, contents[number], packing, caps[number])
+            contents[number] = finish.rewrite(file, packing, cap=caps[number], salvage=True)
     listing = _listing_faults(path, contents)
     if path.is_dir() and (any(ill) or listing):
         finish.write_listing(path, contents)
@@ -92,15 +94,6 @@ def _look(path: Path) -> finish.FileContent:
     for channel, topic in scan.topics.items():
         counts[topic.name] += scan.counts[channel]
     return finish.content_of(BagFile(path.name, dict(counts), first, last), scan)
-
-
-def _mend(
-    path: Path, content: finish.FileContent, packing: finish.Packing, cap: int | None
-) -> finish.FileContent:
-    """Rewrite one file; a damaged one stays beside the new one under another name."""
-    if content.damaged:
-        shutil.copy2(path, path.with_suffix(".mcap.damaged"))
-    return finish.rewrite(path, packing, cap=cap, salvage=True)
 
 
 def _listing_faults(path: Path, contents: list[finish.FileContent]) -> list[str]:

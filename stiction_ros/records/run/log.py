@@ -105,7 +105,10 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
     published = events.published_counts([message for _, message in messages])
     runs = loop_runs(signals, bag_source(path), namespace, notes)
     run = max(runs, key=len)
-    said = _said(messages, runs, run)
+    place = runs.index(run)  # what was said between the begin of the run and that of the next one
+    begin = run.begin if place else 0
+    end = runs[place + 1].begin if place + 1 < len(runs) else math.inf
+    said = [message for number, message in messages if begin <= number < end]
     configured = [message for number, message in messages if number <= run.end or run is runs[-1]]
     if len(signals.loops) > 1:
         space = signals.loop(namespace)
@@ -132,16 +135,6 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
         gaps=events.gap_log(said),
         pv_to_op_ms=events.answer_times(said),
     )
-
-
-def _said(
-    messages: Sequence[tuple[int, BagMessage]], runs: Sequence[LoopRun], run: LoopRun
-) -> list[BagMessage]:
-    """Return what was said between the beginning of a run and that of the next one."""
-    place = runs.index(run)
-    begin = run.begin if place else 0
-    end = runs[place + 1].begin if place + 1 < len(runs) else math.inf
-    return [m for number, m in messages if begin <= number < end]
 
 
 def _record(run: LoopRun, runs: Sequence[LoopRun]) -> Record:

@@ -44,9 +44,6 @@ def report_run(
         seconds: wall time of the run, when measured better than by the bag.
         load: of the machine before the run, processes that want a core, where known.
         namespace: of the loop's topics, for a bag that holds several loops.
-
-    Raises:
-        InputError: as :func:`stiction_ros.records.run.log.read_run`.
     """
     log = read_run(bag, namespace=namespace)
     return write_run(tell(log, scenario=scenario, name=name), out, seconds, load)

@@ -106,10 +106,8 @@ def score(
 ) -> Phase:
     """Score every output over samples ``first`` up to, not including, ``last``.
 
-    Args:
-        record: with set-points; without them the mean of each PV stands in.
-        period: dominant period, samples; None leaves amplitudes out.
-        noise_std: σ of the measurement noise of each output where known, else 0.
+    Without set-points the mean of each PV stands in, without a period, samples, amplitudes are left
+    out; ``noise_std`` is σ of the measurement noise of each output where known, else 0.
     """
     part = record.part(first, last)
     there = part.quality != Quality.BAD

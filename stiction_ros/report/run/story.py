@@ -75,13 +75,7 @@ def _frictions(law: Behaviour) -> tuple[float, float] | None:
 
 
 def tell(log: RunLog, *, scenario: Scenario | None = None, name: str | None = None) -> Story:
-    """Score a run.
-
-    Args:
-        log: of the run, from a bag or from :func:`log_of`.
-        scenario: that was run; with it the stiction-free loop is simulated for comparison.
-        name: for headings; the scenario's or the record's when not given.
-    """
+    """Score a run; with the ``scenario`` that was run the stiction-free loop is simulated, too."""
     record = log.record
     truth, seed = simulated_plant(log)
     if scenario is not None:

@@ -42,15 +42,7 @@ def loop_page(
     gain: Mapping[str, Any] | None,
     unit: str = "",
 ) -> str:
-    """Return the page.
-
-    Args:
-        entry: row of the loop.
-        record: part that was looked at.
-        found: what identification made of it.
-        gain: mapping of ``gain --json``, None where it was not simulated.
-        unit: of PV; empty where none was given.
-    """
+    """Return the page of a loop; ``gain`` is that of ``gain --json``, ``unit`` that of PV."""
     unit = text(unit or NO_UNIT)
     headline = HEADLINES.get(entry.verdict or "", "Not judged")
     op_unit = "% of travel" if entry.op_unit == say.PERCENT else "OP's own unit"
