@@ -34,11 +34,9 @@ class ControlDesign:
     hand_over_samples: int = 200  # past samples replayed into the observer of a new controller
     fallback: FallbackRule = FallbackRule()  # how long a strategy other than the first may stand in
     slip_check: bool = True  # whether jumps are watched by a second observer
-    # samples for which a jump waits for the disturbance estimate to come to rest
-    longest_wait: int = 0
+    longest_wait: int = 0  # samples for which a jump waits for a resting disturbance estimate
     gap_samples: int = 0  # free samples of the optimality gap of each step; 0 leaves it out
-    # valve_names, output_names: for messages; numbers stand in where empty
-    valve_names: tuple[str, ...] = ()
+    valve_names: tuple[str, ...] = ()  # valve_names, output_names: for messages; or numbers
     output_names: tuple[str, ...] = ()
     # makes embedding or inversion in place of the exact ones, of its mode, of the unaware
     # formulation and of the friction of each valve, None for a healthy one; None for these

@@ -34,11 +34,9 @@ class StickyState:
 
     last: FloatArray  # stem estimates χ̂, shape (m,), %
     interval: FloatArray  # lowest and highest stem position that is possible, shape (m, 2), %
-    # least, largest: jump with its margin, shape (m,), %; the least is always allowed
-    least: FloatArray
+    least: FloatArray  # least, largest: jump with margin, shape (m,), %; the least is allowed
     largest: FloatArray
-    # distance that a jumping stem must keep from the limits for OP's sake, (m,), %
-    room: FloatArray
+    room: FloatArray  # distance of a jumping stem from the limits, for OP's sake, (m,), %
 
 
 class EmbeddingProblem:

@@ -20,8 +20,7 @@ class HorizonWeights:
     state: FloatArray  # Q, shape (n, n)
     move: FloatArray  # S, shape (m, m), on Δχ (which is Δu for valves without friction)
     terminal: FloatArray  # V_F, shape (n, n)
-    # samples beyond the horizon in which the last stems stay and Q goes on counting
-    look_ahead: int = 0
+    look_ahead: int = 0  # samples beyond the horizon, with stems at rest, that Q counts
 
 
 @dataclasses.dataclass(frozen=True)

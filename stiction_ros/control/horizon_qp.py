@@ -23,8 +23,7 @@ class HorizonSolution:
     cost: float  # of the plan
     slack: FloatArray  # by how much outputs break their soft bounds at most, shape (p,)
     variables: FloatArray  # r
-    # outputs at samples 1 … N, shape (N, p), where soft bounds have asked for them
-    pv: FloatArray | None = None
+    pv: FloatArray | None = None  # outputs at 1 … N, shape (N, p), if soft bounds asked for them
 
 
 @dataclasses.dataclass(frozen=True)

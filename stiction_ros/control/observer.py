@@ -29,11 +29,9 @@ class ObserverTuning:
     kind: ObserverKind  # Kalman filter, or the Luenberger observer with K_x = 0 and K_d = gain · I
     state_noise: float  # variance of stem-like noise that enters through B, in %²
     disturbance_noise: FloatArray  # variance of the random walk of d, per output, in (units of PV)²
-    # variance of the measurement noise, per output, in (units of PV)²
-    measurement_noise: FloatArray
+    measurement_noise: FloatArray  # variance of measurement noise, per output, in (units of PV)²
     gain: float = 0.2  # K_d of the Luenberger observer, 0 < gain ≤ 1; 1 is deadbeat and jitters
-    # innovations beyond this many standard deviations are outliers; inf takes all
-    gate: float = 20.0
+    gate: float = 20.0  # standard deviations from which innovations are outliers; inf takes all
     gate_samples: int = 3  # successive outliers of one output after which they are taken for true
 
 

@@ -53,8 +53,7 @@ class Plan:
     slack: FloatArray  # violation of the soft output bounds, shape (p,)
     jumps: int = 0  # number of valve jumps planned over the horizon
     converged: bool = True  # whether the solver finished; otherwise the plan was checked instead
-    # value of (19a) with the prices of jumps and slacks, NaN when not known
-    cost: float = float("nan")
+    cost: float = float("nan")  # value of (19a) with prices of jumps and slacks, NaN if unknown
     # what the observer takes for the stem at the first sample, shape (m,), %; None for the stem
     # that the valve models expect of ``op``
     process_input: FloatArray | None = None

@@ -31,8 +31,7 @@ class FallbackRule:
     hold_after: int = 5  # K, oldest age of a plan that is followed on, samples; then OP is held
     fallback_after: int = 0  # samples held until OP goes to ``fallback_op``; 0 holds for ever
     fallback_op: FloatArray | None = None  # where it goes, shape (m,), %; None where it never does
-    # largest move on the way there, shape (m,), % per sample
-    fallback_rate: FloatArray | None = None
+    fallback_rate: FloatArray | None = None  # largest move on the way, shape (m,), % per sample
 
 
 @dataclasses.dataclass(frozen=True)

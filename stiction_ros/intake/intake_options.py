@@ -98,18 +98,15 @@ class IntakeOptions:
 
     columns: CsvColumns = CsvColumns()  # which column is what, for files of one loop
     namespace: str | None = None  # of the loop's topics, for bags that hold several loops
-    # file that lists which tags make up which loop; None finds them by their names
-    tags: Path | None = None
+    tags: Path | None = None  # file of the tags of each loop; None finds them by their names
     strict: bool = False  # whether anything that had to be repaired is a problem
     op_unit: OpUnit | None = None  # of every OP; None takes it from the export
     time_unit: TimeUnit | None = None  # of times that are numbers; None takes it from the export
     dates: DateOrder | None = None  # which comes first in dates; None finds out
     # s, of signals that were reported when they changed, and of rows without a time; None finds it
     sample_time: float | None = None
-    # columns of tag, time and value of tables with one value a row; None finds them
-    long: tuple[str, ...] | None = None
-    # what MODE shows in automatic; None knows the usual words
-    automatic: tuple[str, ...] | None = None
+    long: tuple[str, ...] | None = None  # columns of tag, time, value, one value a row; None finds
+    automatic: tuple[str, ...] | None = None  # what MODE shows in automatic; None: the usual words
 
 
 def known_op_unit(word: str) -> OpUnit | None:

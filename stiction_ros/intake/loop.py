@@ -20,13 +20,9 @@ class Loop:
     # its records, one for each stretch without a gap, in their order; a sample's quality says what
     # was held, bad or in manual. Empty when there is a problem
     parts: tuple[Record, ...]
-    # what was masked, held, cut, converted, with its count, one sentence each; the records bear the
-    # same
-    notes: tuple[str, ...] = ()
-    # why it cannot be read and what helps, one sentence; None when it can be
-    problem: str | None = None
-    # signal to the column or tag that it was read from
-    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    notes: tuple[str, ...] = ()  # what was masked, held, cut, converted; the records bear the same
+    problem: str | None = None  # why it cannot be read and what helps; None when it can be
+    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)  # of each signal, or tag
     op_unit: str = "%"  # what OP is in; OP of a share or a current has been brought to %
     # signal to the least, median and largest number of its column, in the column's own unit; of
     # bags OP in %

@@ -45,8 +45,7 @@ class BridgeRules:
     speed: float = 1.0  # seconds of the plant per second of our clock
     writes: bool = False  # whether anything may be written at all
     asks: bool = False  # whether the grant is asked for at the start
-    # full name of the node whose OP is taken; empty for the first that commands
-    commander: str = ""
+    commander: str = ""  # node whose OP is taken, by full name; empty for the first to command
     identity: int = 1  # number that tells our heartbeat from others', 1 … 32 767
 
 

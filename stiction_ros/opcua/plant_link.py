@@ -38,8 +38,7 @@ class LinkSettings:
     url: str  # of the server
     credentials: Credentials  # of the session
     tags: tuple[str, ...]  # that are subscribed to
-    # tags that may be written, and what for; empty for none
-    written: Mapping[str, Use] = dataclasses.field(default_factory=dict)
+    written: Mapping[str, Use] = dataclasses.field(default_factory=dict)  # and what for
     publishing: float = 0.1  # s between two publications of the server
     asked_again: float = ASKED_AGAIN  # s until tags that the server refuses are tried again
 

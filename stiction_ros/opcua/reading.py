@@ -25,8 +25,7 @@ class TagReading:
     value: float | str | None  # as it was sent; None when there was none
     quality: TagQuality  # of the value
     stamp: int  # source time stamp, ns
-    # whether it opens a subscription; it then tells the present value, whose stamp may be long past
-    first: bool = False
+    first: bool = False  # whether it opens a subscription: the present value, maybe long past
 
     @property
     def number(self) -> float:

@@ -47,8 +47,7 @@ class Answer:
     delays: Delays  # t_d per output and valve, samples
     objective: float | None  # (12a) as the method has it; None for that of the hard law
     points: int  # frictions at which it was evaluated
-    # models and stems that go with it; None for those of the hard law
-    found: EquationError | None = None
+    found: EquationError | None = None  # models and stems; None for those of the hard law
     starts: tuple[SolvedStart, ...] = ()  # every run of a solver
 
 

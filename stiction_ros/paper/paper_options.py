@@ -27,8 +27,7 @@ class PaperOptions:
     # the paper; or ``grid``
     method: str = "nlp"
     output_order: OutputOrders | None = None  # n_a, or one for each output (8a); None takes 3
-    # n_b, or for each output one, or one for each valve (8b), (8c); None means equal to n_a
-    input_order: InputOrders | None = None
+    input_order: InputOrders | None = None  # n_b, or by output, or by valve (8b), (8c); None is n_a
     delay: tuple[int, int] = (0, 10)  # inclusive range of t_d, samples, for every channel
     # friction law, one with a smoothed form: ``he``, ``kano``, ``xch`` or ``semi_physical`` with K
     # = 1.99

@@ -48,8 +48,7 @@ class SearchLog:
     first: int
     points: int  # grid points, or frictions at which the programme evaluated (12a)
     delays_tried: int  # number of choices of delays
-    # every start of the nonlinear programme, in order; empty for the others
-    starts: tuple[SolvedStart, ...] = ()
+    starts: tuple[SolvedStart, ...] = ()  # starts of the nonlinear programme, in order
 
     @property
     def solves(self) -> int:

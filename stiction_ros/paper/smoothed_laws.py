@@ -35,8 +35,7 @@ class SmoothLaw:
     name: str  # of the hard law
     kind: Any  # its class
     states: int  # entries of the state of the smoothed law
-    # stem, shape (N,), %, of OP (N,), f_S, f_D, % and τ, 1/%; from rest at the first OP
-    simulated: Simulated
+    simulated: Simulated  # stem, (N,), %, of OP (N,), f_S, f_D, % and τ, 1/%; from rest at OP
     step: Step  # state, (u_k, u_{k−1}), (f_S, f_D), τ and tanh → next state; numbers or CasADi
 
     def stems(self, op: FloatArray, friction: FloatArray, smoothing: FloatArray) -> FloatArray:

@@ -29,8 +29,7 @@ class LinearModel:
     c: FloatArray
     e: FloatArray  # shape (n, d), effect of measured disturbances in deviations; d may be 0
     constant: FloatArray  # g, shape (n,), the bias of an ARX equation
-    # stem0, pv0: the operating point χ₀ (m,) in % and y₀ (p,) in engineering units
-    stem0: FloatArray
+    stem0: FloatArray  # stem0, pv0: the operating point χ₀ (m,) in %, y₀ (p,) in units of PV
     pv0: FloatArray
 
     def __post_init__(self) -> None:

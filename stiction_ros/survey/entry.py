@@ -37,8 +37,7 @@ class Entry:
 
     name: str  # tag of the loop
     files: tuple[str, ...]  # that it was read from
-    # status, reason: how far it came and why no further; reason is empty when it was judged
-    status: Status
+    status: Status  # status, reason: how far it came, and why no further, empty when judged
     reason: str = ""
     samples: int | None = None  # of all parts
     sample_time: float | None = None  # s
@@ -52,13 +51,10 @@ class Entry:
     f_d: float | None = None
     f_d_interval: Interval | None = None
     band_share: float | None = None  # f_S + f_D over the width of OP's movement
-    # travel_per_hour, reversals_per_hour: of the stem, as recorded
-    travel_per_hour: float | None = None
+    travel_per_hour: float | None = None  # travel_per_hour, reversals_per_hour: of the stem
     reversals_per_hour: float | None = None
-    # measures now and by option, as ``stiction gain`` gives them
-    gain: Mapping[str, Any] | None = None
-    # of friction in the valve, 0 to 1; None where a method does not tell
-    probability: float | None = None
+    gain: Mapping[str, Any] | None = None  # measures now and by option, as of ``stiction gain``
+    probability: float | None = None  # of friction, 0 to 1; None where a method does not tell
     # figures behind the verdict by name, as in ``identify --json``
     evidence: Mapping[str, float] = dataclasses.field(default_factory=dict)
     # what the first round of a valve test would take where the valve is undecided: ``duration``, s,

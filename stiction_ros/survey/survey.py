@@ -75,8 +75,7 @@ class Plan:
     options: SurveyOptions  # of each loop
     out: Path | None = None  # folder of journal, log and pages; None keeps nothing
     resume: bool = False  # whether what the folder holds already is not done again
-    # by loop, see ``ranking.ranked``
-    costs: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    costs: Mapping[str, float] = dataclasses.field(default_factory=dict)  # ``ranking.ranked``
 
 
 def survey(

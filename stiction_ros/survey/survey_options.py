@@ -11,8 +11,7 @@ from stiction_ros.identification.identification_options import IdentificationOpt
 class SurveyOptions:
     """What a worker is told beside the loop."""
 
-    # options of every identification
-    identification: IdentificationOptions = IdentificationOptions()
+    identification: IdentificationOptions = IdentificationOptions()  # of every identification
     gain: bool = True  # whether what would help is simulated for the valves that are found
     pages: bool = True  # whether a page is written for each loop
     units: tuple[tuple[str, str], ...] = ()  # engineering unit of PV by loop, for the pages

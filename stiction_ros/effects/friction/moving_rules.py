@@ -33,8 +33,7 @@ FirstSlip = tuple[int, float]
 class MovingTrace:
     """Where one valve moves, stops and slips, and what that says of J and S."""
 
-    # OP at the last moving sample, before the first slip the stem's level, shape (N,)
-    base: FloatArray
+    base: FloatArray  # OP at the last moving sample, first the stem's level, shape (N,)
     sign: FloatArray  # direction of the last motion, 0 before the first, shape (N,)
     bounds: tuple[float, float, float, float]  # (J low, J high, S low, S high), %
 

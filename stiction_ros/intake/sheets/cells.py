@@ -67,8 +67,7 @@ def as_text(cells: Cells) -> Sequence[str]:
 class Numbers:
     """A column of numbers as it grows."""
 
-    # whether a comma alone in a number is the decimal one; else it sets thousands apart
-    decimal_comma: bool
+    decimal_comma: bool  # whether a lone comma in a number is decimal, and sets no thousands apart
     wrong: Wrong | None = None  # first cell that is no finite number, None for none
     # what stood in the place of numbers, with its count; empty cells as ``''``
     words: Counter[str] = dataclasses.field(default_factory=Counter)

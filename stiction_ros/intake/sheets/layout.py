@@ -26,8 +26,7 @@ _BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
 class Layout:
     """Where things are in a table."""
 
-    # names of the columns, without units in brackets; empty when there is none
-    header: tuple[str, ...]
+    header: tuple[str, ...]  # names of the columns without units in brackets; empty for none
     given: tuple[str, ...]  # names as they stand there
     units: tuple[str, ...]  # unit of each column, empty where not known
     first: int = 0  # row of cells (not counting blank ones) at which data begin

@@ -40,8 +40,7 @@ class Column:
     values: FloatArray  # shape (N,), NaN where there is no number; codes of words for a mode
     blank: FlagArray  # where nothing stood, shape (N,)
     wrong: Wrong | None = None  # the first cell that is no number
-    # what stood in the place of numbers, with its count
-    words: Counter[str] = dataclasses.field(default_factory=Counter)
+    words: Counter[str] = dataclasses.field(default_factory=Counter)  # in the place of numbers
     unit: str = ""  # as the export says, empty when it does not
     known: tuple[str, ...] = ()  # words of a mode, by their codes
 
@@ -60,8 +59,7 @@ class Block:
     time: FloatArray  # s since ``clock.start``, shape (N,), NaN where there is none
     lines: NDArray[np.int64]  # of the rows in the file, shape (N,)
     columns: dict[Key, Column]  # the signals
-    # quality of each row as the file says it, None when it does not
-    mask: QualityArray | None = None
+    mask: QualityArray | None = None  # quality of each row, None when the file does not say it
     notes: tuple[str, ...] = ()  # how it was read
     stray: str = ""  # the first time that is none, as an error says it; empty for none
     mended: tuple[str, ...] = ()  # what was wrong with the table and is put right, in sentences

@@ -37,10 +37,8 @@ class Plan:
 
     shape: Shape  # of the table
     time: TimeColumn  # column of the times; its place is -1 where rows are a sample time apart
-    # name of each loop to its signals' columns; of a long table empty
-    loops: Mapping[str, Mapping[Key, int]]
-    # column of a signal to its own column of times, empty where one is of all
-    own: Mapping[int, TimeColumn] = dataclasses.field(default_factory=dict)
+    loops: Mapping[str, Mapping[Key, int]]  # loop to its signals' columns; empty for a long table
+    own: Mapping[int, TimeColumn] = dataclasses.field(default_factory=dict)  # where not of all
     # column of a signal to the columns of its quality
     quality: Mapping[int, tuple[int, ...]] = dataclasses.field(default_factory=dict)
     whole_quality: tuple[int, ...] = ()  # columns with the quality of whole rows

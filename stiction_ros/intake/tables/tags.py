@@ -42,8 +42,7 @@ class TagList:
 
     loops: Mapping[str, Tag]  # name of the loop, signal, for each tag in small letters
     units: Mapping[str, OpUnit]  # unit of OP of loops of which the list says it
-    # rows that count for one file alone, by its name
-    rows: Mapping[str, Sequence[TagRow]] = dataclasses.field(default_factory=dict)
+    rows: Mapping[str, Sequence[TagRow]] = dataclasses.field(default_factory=dict)  # for one file
     # in the list of a file the tags that its rows name, by their small letters
     own: Mapping[str, str] = dataclasses.field(default_factory=dict)
 

@@ -91,11 +91,9 @@ class FrictionChange:
     status: ChangeStatus  # unchanged, serviced or changed
     valve: str  # tag
     samples: int = 0  # samples of the window that follow the change; 0 when unchanged
-    # the new one, with intervals; None when unchanged or serviced
-    friction: TrustedFriction | None = None
+    friction: TrustedFriction | None = None  # with intervals; None when unchanged or serviced
     doubted: bool = False  # whether the window speaks against the trusted friction, if not enough
-    # whether process and trusted friction explain the window as they should
-    explained: bool = False
+    explained: bool = False  # whether process and trusted friction explain the window
     share: Share | None = None  # of the new friction's signature, None where nothing was measured
     # the window up to the change, None when unchanged
     before: LeadIn | None = dataclasses.field(default=None, compare=False, repr=False)

@@ -18,8 +18,7 @@ class PortRules:
     instruments: tuple[Instrument, ...]  # of the outputs (p)
     lockstep: bool = True  # one sample at a time, each with SP and DV of exactly its stamp
     period: float = 1.0  # s of the receiver's clock between two samples in realtime
-    # in lockstep every PV has an SP of its own stamp; otherwise the last holds
-    scheduled: bool = True
+    scheduled: bool = True  # in lockstep every PV has an SP of its stamp; else the last holds
     needs_dv: bool = False  # in lockstep no sample is complete without its measured disturbances
 
 
@@ -41,8 +40,7 @@ class Sample:
 class PortState:
     """How fresh everything is."""
 
-    # s since the last good message of ``pv``, ``sp``, ``op_applied``; what never came is left out
-    ages: Mapping[str, float]
+    ages: Mapping[str, float]  # s since the last good message; what never came is left out
     period: float  # s that a sample takes by the receiver's clock; 0 in lockstep
     behind: int  # samples that had to be passed over for the newest at the last look
     waiting: int  # PVs that came while no run could begin

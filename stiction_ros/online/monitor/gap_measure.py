@@ -52,9 +52,7 @@ class OutputLook:
     """One output in one window, units of the output."""
 
     name: str  # tag
-    # standard deviation s₁ of the innovations of the model's free run, under the noise of the
-    # baseline
-    gap: float
+    gap: float  # standard deviation s₁ of the free run's innovations under that noise
     baseline: float  # the same in the baseline, s₀
     limit: float  # of s₁/s₀, for a healthy loop to exceed as seldom as asked
     back: float  # of s₁/s₀, below which a gap that had grown counts as gone

@@ -59,8 +59,7 @@ class GapLook:
     grown: bool  # whether the gap counts as grown now
     alarm: bool = False  # whether it has grown with this window
     failure: str = ""  # why the window could not be used, or empty
-    # model and window that the workflow is to look into, or None
-    job: tuple[LoopModel, Record] | None = None
+    job: tuple[LoopModel, Record] | None = None  # model and window for the workflow, or None
 
     @property
     def worst(self) -> gap_measure.OutputLook | None:

@@ -85,11 +85,9 @@ class ReplayBag:
     name: str  # of the bag
     namespace: str  # of the loop's topics
     signals: tuple[Signal, ...]  # in the order of the bag
-    # estimator, controller: configurations, None when the bag has none
-    estimator: NodeConfig | None
+    estimator: NodeConfig | None  # estimator, controller: configurations, None when there is none
     controller: NodeConfig | None
-    # messages of ``stiction`` by the end of their window, ns
-    published_fits: Mapping[int, PublishedFit]
+    published_fits: Mapping[int, PublishedFit]  # on ``stiction``, by the end of their window, ns
     told_fits: Mapping[int, Fit]  # the fits in ``/diagnostics`` by the end of their window, ns
     told_gaps: GapLog  # what the monitor told in ``/diagnostics``
     models: tuple[PublishedModel, ...]  # messages of ``loop_model`` in their order

@@ -41,8 +41,7 @@ class PrintedPlan(Plan):
     choice: Choice  # the sequence with the lower cost (22) under the hard model (4)
     programme: ProgrammeStatus  # how IPOPT ended
     iterations: int  # of IPOPT
-    # programme_cost, warm_start_cost: (22) under the hard model; inf where there is none
-    programme_cost: float
+    programme_cost: float  # programme_cost, warm_start_cost: (22), hard model; inf for none
     warm_start_cost: float
 
 

@@ -33,8 +33,7 @@ class ProgrammeResult:
     """What IPOPT found."""
 
     status: ProgrammeStatus  # how it ended
-    # u over the horizon, shape (N, m), %, within the limits; None when failed
-    op: FloatArray | None
+    op: FloatArray | None  # u over the horizon, shape (N, m), %, in the limits; None when failed
     cost: float  # (22) under the smoothed model; inf when failed
     iterations: int  # number of them
 

@@ -52,8 +52,7 @@ class AugmentedWeights:
     move: FloatArray  # Q_s on Δχ, shape (m, m)
     op: FloatArray  # R on u_i − u_s, shape (m, m)
     terminal: FloatArray  # V_F on ξ_N − ξ_ss, shape (n, n)
-    # S on Δu, shape (m, m), which (19a) has and (22) has not; None for none
-    op_move: FloatArray | None = None
+    op_move: FloatArray | None = None  # S on Δu, (m, m), which (22) has not; None for none
 
     @property
     def in_stems(self) -> HorizonWeights:

@@ -25,8 +25,7 @@ NEAR = 30  # messages of all signals between a sample and another signal's messa
 class Run:
     """Messages of one run."""
 
-    # stamp in ns to the message's number in the log; the first one of each stamp
-    place: dict[int, int]
+    place: dict[int, int]  # stamp in ns to number in the log of the first message of that stamp
     begin: int  # begin, end: numbers of its first and last message in the log
     end: int
     first: int  # first, last: smallest and largest stamp, ns

@@ -45,8 +45,7 @@ class ModeChange:
     mode: str  # ``unaware``, ``embedding``, ``inversion`` or ``hold``
     model: str = ""  # of the valves that it works with, as the controller names it
     reason: str = ""  # why it changed
-    # what it takes for the friction of its valves, by ``V1.f_s``, %
-    frictions: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    frictions: Mapping[str, float] = dataclasses.field(default_factory=dict)  # by ``V1.f_s``, %
 
 
 @dataclasses.dataclass(frozen=True)

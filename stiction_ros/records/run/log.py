@@ -26,8 +26,7 @@ class RunLog:
     record: Record  # the loop's signals, one segment; where some are missing stand bad samples
     start: int  # stamp of the record's first sample, ns
     estimates: tuple[events.Estimate, ...]  # in the order they came
-    # every change of mode, model or friction, the mode at the start first
-    modes: tuple[events.ModeChange, ...]
+    modes: tuple[events.ModeChange, ...]  # changes of mode, model or friction, the first mode first
     loop_models: tuple[events.Text, ...]  # the YAML texts on ``loop_model``
     configs: tuple[events.Text, ...]  # what the nodes published on ``~/config``
     clock: tuple[int, ...]  # the simulated times on ``/clock``, ns
@@ -38,8 +37,7 @@ class RunLog:
     # the controller's estimate of the stem positions at the record's samples, shape (N, m), %, NaN
     # where none was published; None when there is none
     stem_estimate: FloatArray | None = None
-    # from the first to the last publication, on the publishers' clock
-    wall_seconds: float = float("nan")
+    wall_seconds: float = float("nan")  # from first to last publication, on the publishers' clock
     gaps: events.GapLog = events.GapLog({}, {})  # what the monitor told
     # p50, p99, p999 and max of the times from PV to OP; empty in lockstep
     pv_to_op_ms: Mapping[str, float] = dataclasses.field(default_factory=dict)

@@ -31,8 +31,7 @@ class Story:
     free_record: Record | None  # record of that run
     truth: LoopModel | None  # the loop that the plant node simulated; None for a real plant
     seed: int | None  # of the plant's noise, None when unknown
-    # samples of one round of the set-points, None when they do not repeat
-    round_samples: int | None
+    round_samples: int | None  # samples of one round of set-points, None when they do not repeat
     units: Mapping[str, str]  # engineering unit of each PV where known
 
     @property
