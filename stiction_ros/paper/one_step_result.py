@@ -11,17 +11,8 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.identification_options import limited
 from stiction_ros.identification.linear.data import nrmse_fit
-from stiction_ros.identification.problem.input_checks import (
-    TOO_SHORT,
-    require_samples,
-    require_signals,
-)
-from stiction_ros.identification.result.identification import (
-    FitStatus,
-    OutputModel,
-    ValveEstimate,
-    VerdictKind,
-)
+from stiction_ros.identification.problem import input_checks
+from stiction_ros.identification.result import identification
 from stiction_ros.paper.equation_error import EquationError, fit_outputs
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification, SearchLog, SolvedStart
@@ -54,11 +45,11 @@ class Answer:
 def check_record(record: Record, options: PaperOptions) -> ArxOrders:
     """Return the orders and ε of a record that can be worked on; else InputError."""
     smooth_law(options.law)
-    require_signals(record)
+    input_checks.require_signals(record)
     orders = orders_of(record, options)
     unknowns = orders.output + len(record.valves) * orders.input
     needed = orders.first + max(MIN_SAMPLES, 5 * (unknowns + 3))
-    require_samples(record, needed, TOO_SHORT)
+    input_checks.require_samples(record, needed, input_checks.TOO_SHORT)
     return orders
 
 
@@ -155,7 +146,7 @@ def result(
         if delay == high > low
     ]
     return PaperIdentification(
-        status=FitStatus.NO_MODEL if answer.reason else FitStatus.OK,
+        status=identification.FitStatus.NO_MODEL if answer.reason else identification.FitStatus.OK,
         reason=answer.reason,
         method=options.method,
         samples=len(record),
@@ -181,16 +172,16 @@ def valve_estimate(
     stem: FloatArray,
     limit: float,
     law: str = "he",
-) -> ValveEstimate:
+) -> identification.ValveEstimate:
     """Return a point estimate: undecided, with intervals from 0 to the largest friction.
 
     f_D is at most f_S, so both intervals reach from 0 to f_max.
     """
     static, dynamic = float(friction[0]), float(min(friction[0], friction[1]))
     moves = int(np.count_nonzero(np.abs(np.diff(stem)) > 1e-9 * max(limit, 1e-300)))
-    return ValveEstimate(
+    return identification.ValveEstimate(
         name=record.valves[valve],
-        verdict=VerdictKind.UNDECIDED,
+        verdict=identification.VerdictKind.UNDECIDED,
         law=law,
         static_friction=static,
         static_interval=(0.0, max(limit, static)),
@@ -205,14 +196,14 @@ def valve_estimate(
 
 def output_model(
     record: Record, output: int, fit: ArxFit, stems: FloatArray, orders: ArxOrders
-) -> OutputModel:
+) -> identification.OutputModel:
     """Return one output's model with its one-step and its free-run fit."""
     y = record.pv[:, output]
     first, tail = orders.first, y[orders.first :]
     past, inputs = orders.of_output(output, len(stems))
     free_parameters = past + sum(inputs) + 1
     variance = fit.squared_error / max(len(tail) - free_parameters, 1)
-    return OutputModel(
+    return identification.OutputModel(
         name=record.outputs[output],
         a=tuple(map(float, fit.a[:past])),
         b={

@@ -9,14 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from stiction_ros import identification
 from stiction_ros.errors import InputError
-from stiction_ros.identification import (
-    FitStatus,
-    Identification,
-    OutputModel,
-    ValveEstimate,
-    VerdictKind,
-)
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
@@ -66,7 +60,7 @@ class ReplayedEstimator:
         settings: EstimatorNodeSettings,
         origin: int | None = None,
         told: Mapping[int, Mapping[str, Any]] | None = None,
-        fitter: Callable[..., Identification] = fit,
+        fitter: Callable[..., identification.Identification] = fit,
         *,
         watched: LoopModel | None = None,
     ) -> None:
@@ -158,7 +152,7 @@ class ReplayedEstimator:
         self._conclude(live, end, found, whole=True)
 
     def _conclude(
-        self, live: LiveEstimator, end: int, found: Identification, *, whole: bool
+        self, live: LiveEstimator, end: int, found: identification.Identification, *, whole: bool
     ) -> None:
         stamp = self._pairs.stamp_of(end)
         update = live.conclude(end, found)
@@ -177,11 +171,11 @@ class ReplayedEstimator:
         self.fits.append(ReplayedFit(end, stamp, whole, None, why, self._token, ""))
 
 
-def identification_of(mapping: Mapping[str, Any]) -> Identification:
+def identification_of(mapping: Mapping[str, Any]) -> identification.Identification:
     """Return the identification that a mapping of ``identify --json`` tells, without stems."""
     try:
-        return Identification(
-            status=FitStatus(mapping["model"]["status"]),
+        return identification.Identification(
+            status=identification.FitStatus(mapping["model"]["status"]),
             reason=str(mapping["model"]["reason"]),
             method=str(mapping["model"]["method"]),
             samples=int(mapping["samples"]),
@@ -197,10 +191,10 @@ def identification_of(mapping: Mapping[str, Any]) -> Identification:
         ) from None
 
 
-def _valve(valve: Mapping[str, Any]) -> ValveEstimate:
-    return ValveEstimate(
+def _valve(valve: Mapping[str, Any]) -> identification.ValveEstimate:
+    return identification.ValveEstimate(
         name=str(valve["name"]),
-        verdict=VerdictKind(valve["verdict"]),
+        verdict=identification.VerdictKind(valve["verdict"]),
         law=str(valve["law"]),
         static_friction=float(valve["f_s"]),
         static_interval=_interval(valve["f_s_interval"]),
@@ -218,8 +212,8 @@ def _valve(valve: Mapping[str, Any]) -> ValveEstimate:
     )
 
 
-def _output(output: Mapping[str, Any]) -> OutputModel:
-    return OutputModel(
+def _output(output: Mapping[str, Any]) -> identification.OutputModel:
+    return identification.OutputModel(
         name=str(output["name"]),
         a=tuple(float(value) for value in output["a"]),
         b={str(key): tuple(float(v) for v in row) for key, row in output["b"].items()},
