@@ -34,24 +34,25 @@ def add(commands: Any) -> None:
         "controller output and measurement, and say which valve sticks. Of a record with gaps "
         "or of several runs the longest good part is taken.",
     )
-    parser.add_argument("record", metavar="RECORD", help="CSV file, other export, or bag")
+    option = parser.add_argument
+    option("record", metavar="RECORD", help="CSV file, other export, or bag")
     intake.add_columns(parser)
     intake.add_intake(parser)
-    parser.add_argument(
+    option(
         "--na",
         type=searches.output_orders,
         metavar="N[,N]",
         help="order n_a of the process (default: by BIC); methods of the paper take one order, "
         "or one for each output",
     )
-    parser.add_argument(
+    option(
         "--nb",
         type=searches.input_orders,
         metavar="N[,N][/N,N]",
         help="order n_b of the process (default: n_a); methods of the paper take one order, or "
         "one for each valve in a row for each output",
     )
-    parser.add_argument(
+    option(
         "--delay",
         type=delay_range,
         default=(0, 10),
@@ -59,26 +60,22 @@ def add(commands: Any) -> None:
         help="delays to try, samples (0:10)",
     )
     searches.add_law(parser)
-    parser.add_argument(
+    option(
         "--kind",
         choices=searches.LOOP_KINDS,
         help="what the loop controls; a note says whether the process found fits it",
     )
-    parser.add_argument(
+    option(
         "--method",
         default="evidence",
         choices=searches.METHODS,
         help="method of identification (default: evidence)",
     )
     searches.add_search_options(parser)
-    parser.add_argument(
-        "--model", metavar="F.loop.yaml", help="write the identified loop as a loop model"
-    )
-    parser.add_argument(
-        "--why", action="store_true", help="print the figures behind each probability"
-    )
-    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
-    parser.add_argument("--out", metavar="DIR", help="write the page report.html there")
+    option("--model", metavar="F.loop.yaml", help="write the identified loop as a loop model")
+    option("--why", action="store_true", help="print the figures behind each probability")
+    option("--json", metavar="F", help="write the result as JSON; - for stdout")
+    option("--out", metavar="DIR", help="write the page report.html there")
     parser.set_defaults(run=run)
 
 

@@ -37,45 +37,40 @@ def add(commands: Any) -> None:
         "service first, with a page for each loop. A loop that cannot be judged stands in the "
         "list with its reason and stops no other.",
     )
-    parser.add_argument("paths", nargs="+", metavar="PATH", help="files and folders of exports")
+    option = parser.add_argument
+    option("paths", nargs="+", metavar="PATH", help="files and folders of exports")
     intake.add_columns(parser)
     intake.add_intake(parser, many=True)
-    parser.add_argument(
-        "--delay", type=delay_range, metavar="LO:HI", help="delays to try, samples (0:10)"
-    )
+    option("--delay", type=delay_range, metavar="LO:HI", help="delays to try, samples (0:10)")
     add_law(parser)
-    parser.add_argument("--no-gain", action="store_true", help="do not simulate what would help")
-    parser.add_argument(
+    option("--no-gain", action="store_true", help="do not simulate what would help")
+    option(
         "--cost", metavar="F", help="CSV with columns loop,cost: money per hour and unit of |PV−SP|"
     )
-    parser.add_argument(
-        "--units", metavar="F", help="CSV with columns loop,unit: the unit of PV on the pages"
-    )
-    parser.add_argument(
+    option("--units", metavar="F", help="CSV with columns loop,unit: the unit of PV on the pages")
+    option(
         "--previous",
         action="append",
         default=[],
         metavar="F",
         help="JSON of an earlier survey; may be repeated",
     )
-    parser.add_argument("--out", metavar="DIR", help=f"write {PAGE}, {CSV}, {XLSX} and pages there")
-    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
-    parser.add_argument(
+    option("--out", metavar="DIR", help=f"write {PAGE}, {CSV}, {XLSX} and pages there")
+    option("--json", metavar="F", help="write the result as JSON; - for stdout")
+    option(
         "--jobs",
         type=int,
         default=os.cpu_count() or 1,
         metavar="N",
         help="number of processes (all cores)",
     )
-    parser.add_argument(
+    option(
         "--engine",
         default=LOCAL,
         metavar="E",
         help="where to judge: local, or dask://HOST:PORT (local)",
     )
-    parser.add_argument(
-        "--resume", action="store_true", help="go on with the interrupted survey in --out"
-    )
+    option("--resume", action="store_true", help="go on with the interrupted survey in --out")
     parser.set_defaults(run=run)
 
 

@@ -32,21 +32,16 @@ def add(commands: Any) -> None:
         "would decide whether the valve sticks, as a procedure to follow by hand. judge: from the "
         "record of these moves, the verdict, or the next moves.",
     )
-    parser.add_argument("what", choices=("plan", "judge"), help="what to do")
-    parser.add_argument("record", metavar="RECORD|TEST", help="CSV file, other export, or bag")
+    option = parser.add_argument
+    option("what", choices=("plan", "judge"), help="what to do")
+    option("record", metavar="RECORD|TEST", help="CSV file, other export, or bag")
     intake.add_columns(parser)
     intake.add_intake(parser)
-    parser.add_argument(
-        "--before", metavar="RECORD", help="judge: the record that the test was planned from"
-    )
-    parser.add_argument(
-        "--op-limit", type=float, metavar="X", help="how far OP may go from where it is, %%"
-    )
-    parser.add_argument(
-        "--pv-limit", type=float, metavar="X", help="how far PV may go, in its own unit"
-    )
-    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
-    parser.add_argument("--out", metavar="F.csv", help="write the moves: seconds and OP")
+    option("--before", metavar="RECORD", help="judge: the record that the test was planned from")
+    option("--op-limit", type=float, metavar="X", help="how far OP may go from where it is, %%")
+    option("--pv-limit", type=float, metavar="X", help="how far PV may go, in its own unit")
+    option("--json", metavar="F", help="write the result as JSON; - for stdout")
+    option("--out", metavar="F.csv", help="write the moves: seconds and OP")
     parser.set_defaults(run=run)
 
 

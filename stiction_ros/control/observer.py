@@ -14,6 +14,9 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
 
+FORGETTING = 0.98  # of the running mean square of what was passed on
+LIVELY = 2.0  # innovations beyond this many times the usual one count as no more than that
+
 
 class ObserverKind(enum.StrEnum):
     """How the observer gain is chosen."""
@@ -176,10 +179,6 @@ def _luenberger(model: LinearModel, tuning: ObserverTuning) -> FloatArray:
     gain = np.zeros((n + p, p))
     gain[n:] = tuning.gain * np.eye(p)
     return gain
-
-
-FORGETTING = 0.98  # of the running mean square of what was passed on
-LIVELY = 2.0  # innovations beyond this many times the usual one count as no more than that
 
 
 class InnovationGate:

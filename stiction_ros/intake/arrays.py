@@ -21,7 +21,7 @@ from stiction_ros.intake.sheets.sheet import PIECE, Piece, Sheet
 from stiction_ros.intake.sheets.stamps import DateOrder
 from stiction_ros.intake.tables.plan import plan_of
 from stiction_ros.intake.tables.reading import blocks_of
-from stiction_ros.records.csv_names import column_name
+from stiction_ros.records.csv_writer import column_name
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 from stiction_ros.texts import plural

@@ -18,6 +18,9 @@ from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import MOST, SCRIPT, Curve, against, over_time
 from stiction_ros.records.record import Record
 
+CYCLES = 4
+UNCYCLED = 240  # samples of the window where there is no cycle
+
 
 @dataclasses.dataclass(frozen=True)
 class Units:
@@ -211,11 +214,6 @@ def _planes(record: Record, stem: FloatArray | None, window: Window, units: Unit
             )
         )
     return f"<div class='pair'>{''.join(drawn)}</div>"
-
-
-CYCLES = 4
-
-UNCYCLED = 240  # samples of the window where there is no cycle
 
 
 @dataclasses.dataclass(frozen=True)

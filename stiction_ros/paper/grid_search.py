@@ -17,7 +17,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.paper import one_step_result as one_step
-from stiction_ros.paper.equation_error import EquationError, fit_outputs
+from stiction_ros.paper.one_step_result import EquationError, fit_outputs
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification
 from stiction_ros.paper.smoothed_laws import final_smoothing, smooth_law

@@ -13,13 +13,12 @@ from stiction_ros.identification.identification_options import limited
 from stiction_ros.identification.linear.data import nrmse_fit
 from stiction_ros.identification.problem import input_checks
 from stiction_ros.identification.result import identification
-from stiction_ros.paper.equation_error import EquationError, fit_outputs
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification, SearchLog, SolvedStart
 from stiction_ros.paper.smoothed_laws import smooth_law
 from stiction_ros.paper.sustained_oscillation import sustained_oscillations
 from stiction_ros.records.record import Record
-from stiction_ros.signals.arx_fit import ArxFit, ArxOrders, Delays
+from stiction_ros.signals.arx_fit import ArxFit, ArxOrders, Delays, fit_arx
 
 DEFAULT_ORDER = 3
 MIN_SAMPLES = 60
@@ -216,3 +215,27 @@ def output_model(
         fit_one_step=nrmse_fit(tail, tail - fit.residuals),
         fit_free_run=nrmse_fit(tail, fit.free_run(y, stems, first)),
     )
+
+
+@dataclasses.dataclass(frozen=True)
+class EquationError:
+    """The criterion of one record with its stems, shape (m, N), %, and an ARX model per output."""
+
+    fits: tuple[ArxFit, ...]
+    stems: FloatArray
+
+    @property
+    def squared_error(self) -> float:
+        """Mean of SE over the outputs, (12a), squared engineering units."""
+        return float(np.mean([fit.squared_error for fit in self.fits]))
+
+
+def fit_outputs(
+    pv: FloatArray, stems: FloatArray, delays: Delays, orders: ArxOrders
+) -> EquationError:
+    """Fit every output: PV, shape (N, p), of stems, shape (m, N), %, with t_d of each valve."""
+    fits = tuple(
+        fit_arx(y, stems, row, orders, orders.kept(i, len(stems)))
+        for i, (y, row) in enumerate(zip(pv.T, delays, strict=True))
+    )
+    return EquationError(fits, stems)

@@ -29,6 +29,8 @@ FEWEST_STAMPS = 5  # stamps from which on it can be told that they are cut off
 DIFFERENT = 0.5  # share of rows with a stamp of before in which OP or PV must differ
 BY_CHANCE = 1e-3  # chance with which rows lost at random may pass for stamps with too few digits
 WHOLE = 1e-3  # share of the smallest step by which others may be off its multiples
+SILENT = 1e-4  # jitter, as a share of the sample time, that is rounding and not worth a word
+TOLERATED = 0.1  # jitter, as a share of the sample time, that is taken as regular with a note
 
 
 @dataclasses.dataclass(frozen=True)
@@ -226,10 +228,6 @@ def _of_rounded(given: FloatArray) -> IntArray | None:
             low, high = behind - 0.5, behind + 0.5
         low, high = max(low, behind - 0.5), min(high, behind + 0.5)
     return counts
-
-
-SILENT = 1e-4  # jitter, as a share of the sample time, that is rounding and not worth a word
-TOLERATED = 0.1  # jitter, as a share of the sample time, that is taken as regular with a note
 
 
 def sample_time(

@@ -16,7 +16,7 @@ from stiction_ros.identification import Identification, identify
 from stiction_ros.identification.valve_test.facts import Limits, facts_before
 from stiction_ros.identification.valve_test.plan import first_round
 from stiction_ros.intake.loop import Loop
-from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE
+from stiction_ros.records.csv_writer import DEFAULT_OUTPUT, DEFAULT_VALVE
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record

@@ -18,7 +18,7 @@ from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, is_clock, t
 from stiction_ros.intake.tables.one_value import OneValue, one_value
 from stiction_ros.intake.tables.qualities import qualities_of, quality_places
 from stiction_ros.intake.tables.tags import TagList
-from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
+from stiction_ros.records.csv_writer import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
 
 LOOKED_AT = 1000  # rows by which it is told what stands in a column
 

@@ -22,7 +22,7 @@ from stiction_ros.intake.tables.one_value import OneValue
 from stiction_ros.intake.tables.plan import Plan
 from stiction_ros.intake.tables.qualities import bad_qualities
 from stiction_ros.intake.tables.tags import TagList
-from stiction_ros.records.csv_names import QUALITY
+from stiction_ros.records.csv_writer import QUALITY
 from stiction_ros.records.quality import QUALITY_WORDS, QualityArray
 
 Reader = tuple[int, Numbers] | tuple[int, Words]

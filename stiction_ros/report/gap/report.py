@@ -32,6 +32,7 @@ _HEADLINES = {
     GapVerdict.NONE: "The simulation explains the records",
     GapVerdict.UNTESTABLE: "These records cannot show what the simulation lacks",
 }
+WINDOW = 400  # samples that are drawn, where an effect moves PV most
 
 
 def report_gap(found: Discrepancy, out: str | Path) -> Path:
@@ -255,9 +256,6 @@ def _driver(found: Discrepancy, look: Look, place: str) -> tuple[FloatArray, str
         return found.runs.op[:, names.index(tag)], f"OP of {tag} (%)"
     i = found.model_before.outputs.index(tag)
     return look.scores.base.run.forced[:, i], f"free run of {tag}"
-
-
-WINDOW = 400  # samples that are drawn, where an effect moves PV most
 
 
 def effect_card(effect: FoundEffect) -> str:
