@@ -53,14 +53,8 @@ class LoopBridge:
     """Hands tags to a :class:`LoopSampler`, and OPs to the plant as long as it grants them.
 
     All times are s on one clock that only rises, handed in by the caller. The bridge itself
-    writes nothing: it returns orders, and is told by :meth:`written` what became of each.
-
-    What speaks against writing (and gives a grant back at once): no connection or no keep-alive;
-    a tag of the loop that the server refuses;
-    the plant's own heartbeat standing still; three samples in succession with a bad PV; OP in
-    force, mode or limits of bad quality; OP in force beyond the limits; no OP from the commander
-    for three samples; an OP that is not taken in time; a write that is refused, or that takes
-    longer than half the watchdog's time.
+    writes nothing: it returns orders, and is told by :meth:`written` what became of each. What is
+    against writing gives a grant back at once, as a write that is refused or takes too long does.
     """
 
     def __init__(self, tags: LoopTags, rules: BridgeRules, now: float) -> None:

@@ -71,21 +71,15 @@ class PlantClock:
 class LoopSampler:
     """Makes samples at every sample time of what tags report when they change.
 
-    The rule, with t_k the time of sample k, T the sample time and a jitter of T/10:
+    With t_k the time of sample k, T the sample time and a jitter of T/10:
 
-    - PV, SP and DV of sample k are the last values with stamps up to t_k + jitter: a value holds
-      until the next one comes.
-    - Sample k is closed when each PV has a stamp within the jitter of t_k or later, and
-      otherwise T/2 after t_k. What comes later for it is ``late`` and counts for the next.
-    - OP in force in sample k is the last value with a stamp up to t_k + T/2: what acted for most
-      of it. It is told with sample k + 1.
-    - t_0 is the stamp of the first PV that changes (after three samples without any, or ten while
-      a PV has not been reported at all: the newest stamp heard). The grid follows slow shifts of
-      the PV's stamps, and moves when ten in succession lie beside it by the same amount.
-    - A stamp before the last one of its tag is of the past, one more than 3 samples ahead of the
-      plant's time of the future: refused and counted. After three in succession the tag has no
-      value; the tenth is believed, and begins a new run when it is that of a PV. The first
-      report of a subscription tells the present, whatever its stamp.
+    - PV, SP and DV of sample k are the last values with stamps up to t_k + jitter. It closes when
+      each PV has a stamp within the jitter of t_k or later, and otherwise T/2 after t_k.
+    - OP in force in sample k is the last with a stamp up to t_k + T/2; it is told with k + 1.
+    - t_0 is the stamp of the first PV that changes, or else the newest stamp heard. The grid follows
+      slow shifts of the PV's stamps, and moves when ten in succession lie beside it alike.
+    - Stamps of the past and of the future are refused and counted. After three in succession the
+      tag has no value; the tenth is believed, and begins a new run when it is that of a PV.
     - A value that is not good, or of a server that is silent, is NaN.
 
     Attributes:

@@ -11,7 +11,7 @@ from stiction_ros.processes.process import Process
 
 
 class AlteredProcess(Process):
-    r"""Another process with effects on its outputs, in deviations from its operating point.
+    r"""The process ``inner`` with ``effects`` on its outputs, about its operating point.
 
     .. math::
         y_k &= y_0 + C z_k + D (x_k - y_0) \\
@@ -19,13 +19,8 @@ class AlteredProcess(Process):
 
     with x the output of the process as it was. The effects come before disturbances, noise
     and sensors. For a linear process it is the same whether they act on the output or on all
-    inputs of that output's equation; noise that enters the equation passes them as well.
-
-    The state is that of the process and then z.
-
-    Attributes:
-        inner: the process without the effects.
-        effects: per output, in signal order.
+    inputs of that output's equation; noise that enters the equation passes them, too. The state is
+    that of the process and then z.
     """
 
     def __init__(

@@ -18,13 +18,8 @@ Channel = tuple[FloatArray, FloatArray, int]  # b₁ …, a₀ = 1, a₁ … and
 def held(num: ArrayLike, den: ArrayLike, dead_time: float, sample_time: float) -> Channel:
     """Return a continuous transfer function at its samples, the stem held between them.
 
-    Args:
-        num, den: coefficients, the highest power of s first, time in s.
-        dead_time: s, 0 up; it need be no whole number of samples.
-        sample_time: s.
-
-    Raises:
-        InputError: PV would answer at once.
+    ``num`` and ``den`` begin with the highest power of s; the dead time, s, need be no whole
+    number of samples. A PV that would answer at once is refused.
     """
     above, below = (np.trim_zeros(np.array(each, dtype=float), "f") for each in (num, den))
     n = len(below) - 1

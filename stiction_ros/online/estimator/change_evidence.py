@@ -212,15 +212,9 @@ class Evidence:
         changes from different samples on is to be compared over the same rows: the gain that is
         left open explains a little by itself, and more where there are more rows.
 
-        Args:
-            valve: index.
-            first: sample.
-            stems: other positions from ``first`` on, shape (n − first, G), %.
-            begin: first of the samples that count, not above ``first``; None for ``first``.
-
-        Returns:
-            Log likelihoods over that of the trusted stems, shape (G,), and the mean squares of
-            the innovations that are left, shape (G,).
+        The ``stems`` from ``first`` on are of shape (n − first, G), %; ``begin`` ≤ ``first``.
+        Returned are log likelihoods over that of the trusted stems, (G,), and the mean squares of
+        the innovations that are left, shape (G,).
         """
         whole = np.repeat(self.stem[:, [valve]], stems.shape[1] + 1, axis=1)
         whole[first:, 1:] = stems  # the first column is what is trusted

@@ -91,9 +91,8 @@ class GapLook:
 class GapMonitor:
     """Keeps the window, the baseline and whether the gap has grown.
 
-    The baseline is a stretch of signals, not a figure: another model is measured on the same
-    stretch. When as many samples have passed under another model, they become the baseline if
-    their gap is smaller: a limit cycle, say, is no good yardstick.
+    The baseline is a stretch of signals: another model is measured on the same one. When as many
+    samples have passed under another model, they become the baseline if their gap is smaller.
 
     The workflow looks into the window with which the gap has grown, and into one more every
     half window while it stays so, up to the first that lies wholly behind the alarm.

@@ -51,7 +51,7 @@ class ReplayedEstimator:
         origin: stamp of sample 0 of the run, ns; None for the first ``pv`` in the bag.
         told: recorded identifications by the end of their window in ns; they stand in for
             windows that reach back before the bag, so that trust is built on all of them.
-        fitter: runs one fit; the default runs it here and now.
+        fitter: runs one fit.
         watched: what the monitor compares with; None for the loop as it is identified.
     """
 

@@ -41,8 +41,7 @@ def report_run(
         out: folder, made when missing; or the ``.html`` file alone.
         scenario: that was run, for the comparison with a loop without friction.
         name: of the loop in the report; the scenario's or the bag's when not given.
-        seconds: wall time of the run, when measured better than by the bag.
-        load: of the machine before the run, processes that want a core, where known.
+        seconds, load: wall time of the run, and of the machine before it, where known.
         namespace: of the loop's topics, for a bag that holds several loops.
     """
     log = read_run(bag, namespace=namespace)

@@ -3,15 +3,12 @@
 Everything is computed from the error e = PV − SP inside the *holds*: the stretches of samples
 between two moves of any set-point.
 
-- *Dominant period* T of the phase `before` and *amplitude* of an output, √2 × RMS of the
-  spectral line at T: see :mod:`stiction_ros.signals.oscillation`.
+- *Amplitude*: √2 × RMS of the spectral line at the dominant period of the phase `before`.
 - *Offset*: mean over the holds of |mean e| over their last 50 samples. Holds of fewer than
   100 samples have not settled by then and do not count, unless all are shorter.
-- *Work* of each valve per hour, and the largest move of its OP from one sample to the next: see
-  :mod:`stiction_ros.records.valve_work`.
-- *IAE per hour*: ∫|e|dt over all samples of the phase, per hour, minus the share of white
-  measurement noise, E|v| = √(2/π) σ ≈ 0.798 σ. With time in hours on both sides that is
-  mean |e| − 0.798 σ, in PV units × h per h.
+- *Work* of each valve per hour, and the largest move of its OP from one sample to the next.
+- *IAE per hour*: ∫|e|dt per hour, minus the share of white measurement noise, E|v| = √(2/π) σ ≈
+  0.798 σ. With time in hours on both sides that is mean |e| − 0.798 σ, in PV units × h per h.
 """
 
 from __future__ import annotations
