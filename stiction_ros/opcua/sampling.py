@@ -76,8 +76,8 @@ class LoopSampler:
     - PV, SP and DV of sample k are the last values with stamps up to t_k + jitter. It closes when
       each PV has a stamp within the jitter of t_k or later, and otherwise T/2 after t_k.
     - OP in force in sample k is the last with a stamp up to t_k + T/2; it is told with k + 1.
-    - t_0 is the stamp of the first PV that changes, or else the newest stamp heard. The grid follows
-      slow shifts of the PV's stamps, and moves when ten in succession lie beside it alike.
+    - t_0 is the stamp of the first PV that changes, or else the newest stamp heard. The grid
+      follows slow shifts of the PV's stamps, and moves when ten in succession lie beside it alike.
     - Stamps of the past and of the future are refused and counted. After three in succession the
       tag has no value; the tenth is believed, and begins a new run when it is that of a PV.
     - A value that is not good, or of a server that is silent, is NaN.
