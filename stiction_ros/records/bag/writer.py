@@ -15,14 +15,8 @@ from stiction_ros import __version__
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.finish import ROSBAG2, Packing, finish_bag, storage_path
 from stiction_ros.records.bag.run_metadata import RUN, may_tell, news
-from stiction_ros.records.storage.bag_metadata import (
-    BagFile,
-    BagTopic,
-    Qos,
-    bag_information,
-    metadata_record,
-    qos_yaml,
-)
+from stiction_ros.records.storage import bag_metadata
+from stiction_ros.records.storage.bag_metadata import Qos
 from stiction_ros.records.storage.mcap_journal import Journal
 
 __all__ = ["BagWriter", "Packing", "Qos", "Splitting"]
@@ -41,7 +35,7 @@ class _Entry:
 
     __slots__ = ("channel", "count", "tells", "topic")
 
-    def __init__(self, channel: int, topic: BagTopic) -> None:
+    def __init__(self, channel: int, topic: bag_metadata.BagTopic) -> None:
         self.channel = channel
         self.topic = topic
         self.count = 0
@@ -98,7 +92,9 @@ class BagWriter:
         """
         self._open()
         profiles = (qos,) if isinstance(qos, Qos) else tuple(qos)
-        topic = BagTopic(name, type, definition_text, type_hash, qos_yaml(profiles))
+        topic = bag_metadata.BagTopic(
+            name, type, definition_text, type_hash, bag_metadata.qos_yaml(profiles)
+        )
         if name in self._entries:
             known = self._entries[name].topic
             if known.type == type:
@@ -198,8 +194,8 @@ class BagWriter:
         self._journal = Journal(path)
         self._first = None
         self._schemas = {}
-        start = bag_information([BagFile(path.name, {}, None, None)], [])
-        self._journal.put(Metadata(metadata=metadata_record(start), name=ROSBAG2))
+        start = bag_metadata.bag_information([bag_metadata.BagFile(path.name, {}, None, None)], [])
+        self._journal.put(Metadata(metadata=bag_metadata.metadata_record(start), name=ROSBAG2))
         self._journal.put(Metadata(metadata=self._run, name=RUN))
         for entry in self._entries.values():
             self._announce(entry)
