@@ -99,10 +99,7 @@ class EmbeddingMpc(Formulation):
         tuning: EmbeddingTuning,
         spreads: Sequence[FrictionSpread | None] | None = None,
     ) -> None:
-        """Factorise one problem per combination of patterns, for up to three sticky valves.
-
-        What a jump costs goes by the frictions that are known now.
-        """
+        """Factorise one problem per combination of patterns, for up to three sticky valves."""
         self.limits, self.tuning = limits, tuning
         self._sticky = [j for j, friction in enumerate(frictions) if friction is not None]
         if not 1 <= len(self._sticky) <= max(SECOND_JUMPS):

@@ -58,10 +58,7 @@ class _Programme:
         self._model, self._ready = daqp.Model(), False
 
     def solve(self, linear: FloatArray) -> tuple[FloatArray, float] | None:
-        """Return x and the optimum within ``lower`` and ``upper``, or None.
-
-        After a failure the factorisation and the active set are dropped.
-        """
+        """Return x and the optimum within ``lower`` and ``upper``, or None, and begin anew."""
         self.limit_reached = False
         if self._load(linear) < 0:
             self._ready = False

@@ -29,10 +29,7 @@ class PatternBounds:
     """
 
     def __init__(self, cost: HorizonCost, combinations: Sequence[Combination]) -> None:
-        """Eliminate the moves of the healthy valves, and note which jumps each pattern makes.
-
-        The loops are compiled here, so that no control step waits for it.
-        """
+        """Eliminate the moves of healthy valves, note each pattern's jumps, compile the loops."""
         from stiction_ros.control.box_bounds import box_bounds  # compiled: slow to import
 
         width, horizon = len(combinations[0]), cost.horizon

@@ -25,10 +25,7 @@ class Stayed:
 
 
 class _Rival:
-    """The assumption that one valve stayed, followed sample by sample.
-
-    A later, larger OP may have moved it, or not: a *stuck* rival stays whatever OP does.
-    """
+    """The assumption that one valve stayed; a *stuck* one stays whatever OP does later."""
 
     def __init__(self, observer: Observer, belief: ValveBelief, op: float, stuck: bool) -> None:
         self.observer = observer.copy()

@@ -74,10 +74,7 @@ def record_from_arrays(
     name: str,
     op_unit: str | None,
 ) -> Record:
-    """Return :meth:`stiction_ros.records.record.Record.from_arrays`, with its arguments.
-
-    The ``tags`` are those of the valves, ``V``, and the outputs, ``PV``, where they are given.
-    """
+    """Return :meth:`stiction_ros.records.record.Record.from_arrays`, with its arguments."""
     step = np.ndim(time) == 0
     if step and not (np.asarray(time).dtype.kind in "iuf" and 0 < time < np.inf):
         raise InputError(

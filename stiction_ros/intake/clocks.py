@@ -94,11 +94,7 @@ class _Rows:
         return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
 
     def seams(self, change: Change) -> NDArray[np.intp]:
-        """Return the rows before which a clock is set by a change, as far as times tell.
-
-        Both ends of a fall lie within what is passed twice, those of a leap do not lie within
-        what is left out, and it is nearer to the whole change than to nothing.
-        """
+        """Return the rows before which a change sets the clock, by more than half of it."""
         steps, (low, high) = np.diff(self.wall), change[:2]
         first, then = self.wall[:-1], self.wall[1:]
         if change.back:

@@ -58,10 +58,7 @@ class LoopBridge:
     """
 
     def __init__(self, tags: LoopTags, rules: BridgeRules, now: float) -> None:
-        """Begin to listen; ``rules.writes`` needs ``tags.grant``.
-
-        ``refused`` names the tags of the loop that the server refuses, each with why.
-        """
+        """Begin to listen; ``rules.writes`` needs ``tags.grant``."""
         self.tags, self.rules = tags, rules
         self.sampler = LoopSampler(tags, rules.speed)
         self.grant = begin(now, rules.writes and tags.grant is not None)

@@ -134,10 +134,7 @@ class TagMap:
 
 
 def check_address(address: str, where: str) -> None:
-    """Raise InputError unless ``address`` is one of OPC UA over TCP without a password in it.
-
-    Its port, where it names one, is 1 to 65535.
-    """
+    """Raise InputError unless ``address`` is one of OPC UA over TCP without a password in it."""
     if not re.fullmatch(r"opc\.tcp://[^\s/]+(/\S*)?", address):
         raise InputError("is no address of a server", where=where, fix="write opc.tcp://HOST:PORT")
     if "@" in address:

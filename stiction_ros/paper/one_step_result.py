@@ -172,10 +172,7 @@ def valve_estimate(
     limit: float,
     law: str = "he",
 ) -> identification.ValveEstimate:
-    """Return a point estimate: undecided, with intervals from 0 to the largest friction.
-
-    f_D is at most f_S, so both intervals reach from 0 to f_max.
-    """
+    """Return a point estimate: undecided, with intervals from 0 to f_max, as f_D ≤ f_S."""
     static, dynamic = float(friction[0]), float(min(friction[0], friction[1]))
     moves = int(np.count_nonzero(np.abs(np.diff(stem)) > 1e-9 * max(limit, 1e-300)))
     return identification.ValveEstimate(

@@ -66,8 +66,5 @@ class LinearModel:
             return np.full((len(self.pv0), len(self.stem0)), np.inf)
 
     def step_responses(self, samples: int) -> FloatArray:
-        """Return the responses, shape (N, p, m), of outputs to stem steps of 1 % at sample 0.
-
-        The ``constant`` is left out.
-        """
+        """Return responses, (N, p, m), to stem steps of 1 % at sample 0, without ``constant``."""
         return responses(self.a, self.c, itertools.repeat(self.b, samples))

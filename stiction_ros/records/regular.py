@@ -276,10 +276,7 @@ def sample_time(
 
 
 def shortest(first: float, last: float, steps: int, tolerance: float) -> float:
-    """Return the shortest decimal that is the step, s, of ``steps`` steps from one time to another.
-
-    The last time may be moved by ``tolerance`` steps.
-    """
+    """Return the shortest decimal, s, that is the step from one time to another in ``steps``."""
     mean = float(last - first) / steps
     for digits in range(1, 15):
         short = float(f"{mean:.{digits}g}")

@@ -13,10 +13,7 @@ Cell = str | tuple[str, str]  # text of a table cell, or its class and its text
 
 
 def page_file(out: str | Path) -> tuple[Path, Path | None]:
-    """Return the file of a page, and the folder for what stands beside it; folders are made.
-
-    An ``.html`` file stands alone, without a folder.
-    """
+    """Return the file of a page, and its folder, made where need be; None for a lone ``.html``."""
     out = Path(out)
     alone = out.suffix.lower() == ".html"
     folder = out.parent if alone else out

@@ -18,10 +18,7 @@ sample; two cycles of their own that part by half a turn within the record come 
 
 
 def beats(error: FloatArray, period: float) -> FloatArray:
-    """Return the samples, not whole, at which PV − SP, (N,), sets out upwards through its mean.
-
-    The mean is a slow one over cycles of ``period`` samples.
-    """
+    """Return the samples, not whole, at which PV − SP, (N,), sets out upwards through its mean."""
     moved = moving(error, period)
     rows = []
     for k in turnings(moved, 0.3 * size(moved)).tolist():

@@ -81,10 +81,7 @@ class Plan:
 def survey(
     loops: Iterable[Loop], plan: Plan, engine: Engine, progress: Progress | None = None
 ) -> Survey:
-    """Judge every loop and rank them; the engine is closed at the end, whatever happens.
-
-    Loops are drawn one after the other, no faster than the engine takes them.
-    """
+    """Judge every loop and rank them; the engine is closed at the end, whatever happens."""
     if plan.out is None:
         if plan.resume:
             raise InputError("has nothing to go on from", where="--resume", fix="add --out DIR")

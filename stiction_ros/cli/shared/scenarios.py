@@ -50,10 +50,7 @@ def _placed(
 def loop_nodes(
     path: Path, directory: Path, *, seed: int | None = None, speed: float | None = None
 ) -> dict[str, dict[str, Any]]:
-    """Return the parameters of the nodes of a loop, by name, in the order of their start.
-
-    The bag goes to ``directory``; speed is in simulated seconds per second, None for lockstep.
-    """
+    """Return the parameters of the nodes of a loop in order of start; no speed is lockstep."""
     nodes = node_parameters(path, directory)
     if seed is not None:
         nodes["plant"]["seed"] = seed

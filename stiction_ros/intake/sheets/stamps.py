@@ -89,10 +89,7 @@ class _Date(NamedTuple):
 
 @dataclasses.dataclass
 class Stamps:
-    """A column of times as it grows; most cells of its first piece tell whether it is numbers.
-
-    The ``order`` of days and months may be said; None finds out.
-    """
+    """A column of times as it grows; days or months may come first in ``order``, None finds out."""
 
     decimal_comma: bool = False
     order: DateOrder | None = None

@@ -18,10 +18,7 @@ _YES, _NO = tuple(WORDS["yes_words"]), tuple(WORDS["no_words"])
 
 
 def bad_qualities(read: Words, name: str) -> tuple[set[str], str]:
-    """Return which words of a column of qualities tell of bad values, and a note on others.
-
-    Its ``name`` tells what a number or a yes means.
-    """
+    """Return which words of a column of qualities, by its name, are bad, and a note on others."""
     kind = quality_kind(name) or "code"
     told = {word: word.strip().casefold() for word in read.known if word.strip()}
     codes = {word: code for word, text in told.items() if (code := number(text)) is not None}

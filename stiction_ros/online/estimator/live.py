@@ -167,10 +167,7 @@ class LiveEstimator:
         return dataclasses.replace(self.settings, law=min(laws)).options()
 
     def add(self, sample: int, op: FloatArray, pv: FloatArray) -> Record | None:
-        """Take in one sample, OP (m,) and PV (p,); return the window when a fit is due.
-
-        No window holds a sample that is not finite: it begins anew behind it.
-        """
+        """Take in one sample, OP (m,) and PV (p,); return a window of finite ones if due."""
         self._last = sample
         if np.isfinite(op).all() and np.isfinite(pv).all():
             self._op.append(np.array(op, dtype=float))

@@ -51,10 +51,7 @@ class OpPort:
         self._last: int | None = None
 
     def judge(self, sender: str, stamp: int, op: FloatArray | None, present: int) -> Reception:
-        """Return whether an OP of a ``sender`` for a ``stamp``, ns, is taken at the present one.
-
-        It is None where it has not a value for each valve.
-        """
+        """Return whether an OP, None for a wrong one, is taken for a ``stamp``, ns."""
         found = self._reception(sender, stamp, op, present)
         self.counts[found] += 1
         if found in (Reception.TAKEN, Reception.LATE):

@@ -43,10 +43,7 @@ class GapFinding:
 
 
 def find_in_window(model: LoopModel, record: Record) -> GapFinding:
-    """Run the workflow, without bootstraps, on a window of a running loop.
-
-    The ``start`` of the record counts from the first sample of the run.
-    """
+    """Run the workflow, without bootstraps, on a window; its ``start`` counts from sample 0."""
     found = discrepancy.find_discrepancy(model, [record], discrepancy.GapOptions(quick=True))
     effects = tuple(_effect(effect, record.start) for effect in found.effects)
     begin = round(record.start / record.sample_time)

@@ -33,10 +33,7 @@ class Offer:
 
 @dataclasses.dataclass(frozen=True)
 class OpMatch:
-    """How the recorded and the replayed ``op`` compare at the samples at which both are there.
-
-    Some are equal in every bit; of the first other one it is told which, and how.
-    """
+    """How many recorded and replayed ``op`` are there, how many equal, and the first others."""
 
     compared: int = 0
     equal: int = 0

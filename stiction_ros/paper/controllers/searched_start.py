@@ -62,11 +62,7 @@ class SearchedStart:
 
 
 class _RouteProgramme:
-    """(22) for one route per sticky valve, in stems off the target: v = T r + v_0.
-
-    The penalty on OP counts where OP is the stem (healthy valves) or lies f_D beyond it
-    (samples that slip); at rest it is left out, as OP then is no unknown.
-    """
+    """(22) for one route per sticky valve, in stems off the target: v = T r + v_0."""
 
     def __init__(self, cost: AugmentedCost, limits: FloatArray, routes: dict[int, Route]) -> None:
         self._cost, self._limits, self._routes = cost, limits, routes

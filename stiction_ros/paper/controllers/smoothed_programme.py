@@ -144,10 +144,7 @@ class SmoothedProgramme:
         }
 
     def solve(self, situation: PlanProblem, op: FloatArray, stems: FloatArray) -> ProgrammeResult:
-        """Return the local optimum that IPOPT reaches.
-
-        The start are OP and the stems by the hard model, shape (N, m) each, %.
-        """
+        """Return the optimum that IPOPT reaches from OP and stems by the hard model, (N, m), %."""
         target = situation.target
         state = situation.state - target.state
         parameters = (

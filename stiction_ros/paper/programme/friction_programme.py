@@ -98,10 +98,7 @@ class FrictionProgramme:
         return x, total / self.frame.outputs
 
     def solve(self, x: FloatArray, smoothing: FloatArray) -> Solution:
-        """Run IPOPT once from ``x``, then solve the coefficients with the frictions held.
-
-        The last is linear least squares; it completes what an iteration limit cut short.
-        """
+        """Run IPOPT once from ``x``, then solve the coefficients with the frictions held."""
         count = 2 * self.frame.valves
         low, high = np.full(self.frame.size, -np.inf), np.full(self.frame.size, np.inf)
         low[:count], high[:count] = 0.0, np.repeat(self.data.limit / self.data.op_span, 2)
@@ -175,11 +172,7 @@ class FrictionProgramme:
         return ca.nlpsol("friction", "ipopt", problem, options)
 
     def _terms(self, x: Any, about: Any, smoothing: Any, order: int) -> tuple[Any, Any]:
-        """Return (12a) over its value at the ARX start, and (12e), then (12f), of every valve.
-
-        These are f_S − f_D and σ²(χ)/(α σ²(u)) − 1, for stems expanded to ``order`` in the
-        frictions about those given.
-        """
+        """Return (12a) over its start's value, f_S − f_D (12e) and σ²(χ)/(α σ²(u)) − 1 (12f)."""
         count, valves = self.data.op.shape[1], self.frame.valves
         stems = [self._stem(j, x, about, smoothing, order) for j in range(valves)]
         total = sum(ca.sumsqr(self._residual(i, x, stems)) for i in range(self.frame.outputs))

@@ -57,10 +57,7 @@ class Told:
 
 
 def tell_runs(stamps: Sequence[int], numbers: Sequence[int]) -> Told:
-    """Tell apart the runs of one signal by its ``stamps``, ns, in the order of the log.
-
-    The ``numbers`` of these messages in the log increase.
-    """
+    """Tell apart the runs of one signal by its stamps, ns, and numbers in the order of the log."""
     pieces = _connected(_chains(stamps, numbers))
     if not pieces:
         return Told((), (), 0)

@@ -117,10 +117,7 @@ def joined(files: Sequence[BagFile]) -> BagFile:
 def bag_information(
     files: Sequence[BagFile], topics: Sequence[BagTopic], *, custom: Mapping[str, str] | None = None
 ) -> dict[str, Any]:
-    """Return the mapping ``rosbag2_bagfile_information`` of a bag.
-
-    Its ``files`` are in order, one at least; ``custom`` are short texts about the run.
-    """
+    """Return the mapping ``rosbag2_bagfile_information`` of a bag of ``files`` in their order."""
     whole = joined(files)
     return {
         "version": VERSION,
