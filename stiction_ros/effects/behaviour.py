@@ -213,7 +213,7 @@ class Behaviour(ABC):
         return np.stack([cls(*row).simulate(values, at, sample_time) for row, at in rows], axis=1)
 
     def filter(self, sample_time: float) -> Filter | None:
-        """Return the behaviour as a filter of samples; None if it is not linear or changes."""
+        """Return the filter of samples ``sample_time`` s apart; None if not linear, or changing."""
         return None
 
     @classmethod

@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LINES = 71_597
+LINES = 71_603
 LINES_OF_STUDIES = 23_304
 NUMERIC_CONSTANTS = 931
 

@@ -34,6 +34,9 @@ def report_record(
         out: folder of ``report.html``, made when missing; or an ``.html`` file.
         parts: all parts of the source that it is from, when there are several.
 
+    Returns:
+        The page.
+
     Raises:
         OSError: nothing can be written there.
 
