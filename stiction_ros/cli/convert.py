@@ -7,13 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.shared.intake_options import (
-    add_columns,
-    add_intake,
-    intake_options,
-    opened,
-    show_loops,
-)
+from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.errors import InputError
 from stiction_ros.records.csv_writer import write_csv
 from stiction_ros.records.run.record_to_bag import write_bag
@@ -30,8 +24,8 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
     parser.add_argument("out", metavar="OUT", help="F.csv, or the directory of a new bag")
-    add_columns(parser)
-    add_intake(parser)
+    intake.add_columns(parser)
+    intake.add_intake(parser)
     parser.add_argument(
         "--iso", action="store_true", help="write times of a CSV file in ISO 8601 (UTC)"
     )
@@ -45,8 +39,8 @@ def run(options: argparse.Namespace) -> int:
     if options.iso and not to_csv:
         raise InputError("is for CSV files", where="--iso", fix="let OUT end in .csv")
     if options.dry_run:
-        return show_loops([Path(options.record)], intake_options(options))
-    records = opened(options).parts
+        return intake.show_loops([Path(options.record)], intake.intake_options(options))
+    records = intake.opened(options).parts
     for number, record in enumerate(records, start=1):
         target = out if len(records) == 1 else out.with_name(f"{out.stem}_{number}{out.suffix}")
         print(f"{target}: {len(record)} samples of {record.sample_time:g} s", file=sys.stderr)

@@ -27,37 +27,32 @@ def add(commands: Any) -> None:
     plant = extensions.part("experiment plant")
     text = PRBS if plant is None else f"{PRBS} {plant.DESCRIPTION}"
     parser = commands.add_parser("experiment", description=text)
+    option = parser.add_argument
     names = ("prbs",) if plant is None else ("prbs", "plant")
-    parser.add_argument("name", metavar=f"{{{','.join(names)}}}", help="the experiment")
-    parser.add_argument(
-        "--model", default=DEFAULT_MODEL, metavar="F", help=f"loop model ({DEFAULT_MODEL})"
-    )
-    parser.add_argument(
-        "--seed", type=int, default=1, metavar="N", help="seed of moves and noise (1)"
-    )
-    parser.add_argument(
-        "--samples", type=int, default=3000, metavar="N", help="number of samples (3000)"
-    )
-    parser.add_argument(
+    option("name", metavar=f"{{{','.join(names)}}}", help="the experiment")
+    option("--model", default=DEFAULT_MODEL, metavar="F", help=f"loop model ({DEFAULT_MODEL})")
+    option("--seed", type=int, default=1, metavar="N", help="seed of moves and noise (1)")
+    option("--samples", type=int, default=3000, metavar="N", help="number of samples (3000)")
+    option(
         "--switch-probability",
         type=float,
         default=SWITCH_PROBABILITY,
         metavar="P",
         help="probability that a valve moves at a sample (0.05)",
     )
-    parser.add_argument(
+    option(
         "--levels",
         type=limits_range,
         default=LEVELS,
         metavar="LO:HI",
         help="the two levels of OP, %% (40:60)",
     )
-    parser.add_argument(
+    option(
         "--keep-effects",
         action="store_true",
         help="keep the effects of the valves of the model (default: ideal valves)",
     )
-    parser.add_argument("--out", required=True, metavar="F", help="file or folder to write")
+    option("--out", required=True, metavar="F", help="file or folder to write")
     if plant is not None:
         plant.add_options(parser)
     parser.set_defaults(run=run)

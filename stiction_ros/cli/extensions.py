@@ -1,8 +1,7 @@
 """Commands, and parts of commands, that another distribution brings.
 
-A distribution names a table under an entry point of the group ``stiction.commands``. Its keys are
-the names of commands, or of parts of a command as they are typed (``demo opcua``, ``demo
---compare``); its values are the module and what ``--help`` says.
+It names a table by an entry point of the group ``stiction.commands``: commands, or parts as they
+are typed (``demo opcua``), to their module and what ``--help`` says.
 """
 
 from __future__ import annotations
@@ -48,11 +47,7 @@ def part(name: str) -> Any | None:
 
 
 def needed_part(name: str) -> Any:
-    """Return the module of a part of a command.
-
-    Raises:
-        InputError: nothing that is installed brings it.
-    """
+    """Return the module of a part of a command; InputError where nothing brings it."""
     module = part(name)
     if module is None:
         refuse(name)

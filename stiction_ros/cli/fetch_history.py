@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import asyncio
 import datetime
 import sys
 from pathlib import Path
@@ -24,21 +25,18 @@ def add(commands: Any) -> None:
         description="Read the history of the loops of a tag map, page by page, and write one CSV "
         "record a loop. A call that was broken off goes on where it stopped.",
     )
-    parser.add_argument("url", metavar="URL", help="address of the server, opc.tcp://HOST:PORT")
-    parser.add_argument("--tags", required=True, metavar="F", help="tag map, *.tags.yaml")
-    parser.add_argument(
-        "--from", dest="begin", required=True, metavar="TIME", help="first time, ISO 8601"
-    )
-    parser.add_argument(
-        "--to", dest="end", required=True, metavar="TIME", help="last time, ISO 8601"
-    )
-    parser.add_argument(
+    option = parser.add_argument
+    option("url", metavar="URL", help="address of the server, opc.tcp://HOST:PORT")
+    option("--tags", required=True, metavar="F", help="tag map, *.tags.yaml")
+    option("--from", dest="begin", required=True, metavar="TIME", help="first time, ISO 8601")
+    option("--to", dest="end", required=True, metavar="TIME", help="last time, ISO 8601")
+    option(
         "--loop",
         action="append",
         default=[],
         help="a loop of the map; may be repeated (default: all)",
     )
-    parser.add_argument(
+    option(
         "--out", default="history", metavar="DIR", help="folder of the records (default: history)"
     )
     add_session(parser)
@@ -63,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
             path = out / "raw" / f"{loop.loop}_{len(files) + 1}.txt"
             files.setdefault(tag, HistoryFile(path))
     with bar("reading history") as show:
-        fetch(options.url, credentials, files, span, show)
+        asyncio.run(fetch(options.url, credentials, files, span, show))
     for loop in loops:
         record = record_of(loop, files, span)
         target = out / f"{loop.loop}.csv"

@@ -11,15 +11,9 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.identify import delay_range
+from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared import searches
 from stiction_ros.cli.shared.as_json import write_json
-from stiction_ros.cli.shared.intake_options import (
-    add_columns,
-    add_intake,
-    intake_options,
-    opened,
-    show_loops,
-)
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.errors import storing
 from stiction_ros.records.parts import longest_part
@@ -36,8 +30,8 @@ def add(commands: Any) -> None:
         "when there is no stable model.",
     )
     parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
-    add_columns(parser)
-    add_intake(parser)
+    intake.add_columns(parser)
+    intake.add_intake(parser)
     parser.add_argument(
         "--kind",
         default="state_space",
@@ -74,8 +68,8 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     if options.dry_run:
-        return show_loops([Path(options.record)], intake_options(options))
-    loop = opened(options)
+        return intake.show_loops([Path(options.record)], intake.intake_options(options))
+    loop = intake.opened(options)
     record = longest_part(loop.parts)
     from stiction_ros.identification.linear.data import LinearKind, LinearStatus, OrderCriterion
     from stiction_ros.identification.linear.fit import LinearOptions, fit_linear

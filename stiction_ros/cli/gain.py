@@ -10,16 +10,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.cli.shared.intake_options import (
-    add_columns,
-    add_intake,
-    intake_options,
-    is_model,
-    opened,
-    show_loops,
-    tell,
-)
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.cli.shared.searches import add_law
 from stiction_ros.config_files import find_config
@@ -57,8 +49,8 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "record", metavar="RECORD|MODEL", help=f"CSV file, other export, bag, or *{MODEL_ENDING}"
     )
-    add_columns(parser)
-    add_intake(parser)
+    intake.add_columns(parser)
+    intake.add_intake(parser)
     add_law(parser)
     parser.add_argument(
         "--valve",
@@ -79,10 +71,10 @@ def run(options: argparse.Namespace) -> int:
     from stiction_ros.gain.gain import Gain
 
     if options.dry_run:
-        return show_loops([Path(options.record)], intake_options(options))
+        return intake.show_loops([Path(options.record)], intake.intake_options(options))
     found: Gain
     verdict: dict[str, Any] = {}
-    if is_model(options.record):
+    if intake.is_model(options.record):
         found = _of_model(options)
     else:
         found, verdict = _of_record(options)
@@ -117,8 +109,8 @@ def _of_record(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
             raise InputError(
                 "a record brings its own", where=f"--{key.replace('_', '-')}", fix="leave it out"
             )
-    loop = opened(options)
-    tell(loop)
+    loop = intake.opened(options)
+    intake.tell(loop)
     record = longest_part(loop.parts)
     settings = IdentificationOptions(law=options.law or IdentificationOptions.law)
     with bar("identifying") as show_share:
@@ -137,12 +129,7 @@ def _verdict(record: Record, identified: Identification, gain: Any) -> dict[str,
 
 
 def show(found: Any, verdict: Mapping[str, Any]) -> None:
-    """Print the verdict, what each option brings with its interval, and the notes.
-
-    Args:
-        found: what would help.
-        verdict: on the valve; empty for a model.
-    """
+    """Print the ``verdict`` on the valve, what each option brings, its interval, and notes."""
     console = Console()
     console.print(_headline(found, verdict), highlight=False)
     table = Table()

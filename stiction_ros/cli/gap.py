@@ -13,15 +13,8 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.identify import delay_range
+from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.cli.shared.intake_options import (
-    add_columns,
-    add_intake,
-    intake_options,
-    is_model,
-    opened,
-    show_loops,
-)
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError, storing
@@ -33,13 +26,7 @@ from stiction_ros.texts import symbol
 if TYPE_CHECKING:
     from stiction_ros.discrepancy import Discrepancy
 
-EXIT_CODES = {
-    "named": 0,
-    "none": 0,
-    "ambiguous": 3,
-    "unknown": 4,
-    "untestable": 5,
-}
+EXIT_CODES = {"named": 0, "none": 0, "ambiguous": 3, "unknown": 4, "untestable": 5}
 
 
 def add(commands: Any) -> None:
@@ -56,8 +43,8 @@ def add(commands: Any) -> None:
         metavar="FILE",
         help="the loop model, then records (CSV files or bags); records alone with --fit-linear",
     )
-    add_columns(parser)
-    add_intake(parser)
+    intake.add_columns(parser)
+    intake.add_intake(parser)
     parser.add_argument(
         "--fit-linear",
         action="store_true",
@@ -87,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     if options.dry_run:
         records = options.inputs if options.fit_linear else options.inputs[1:]
-        return show_loops([Path(path) for path in records], intake_options(options))
+        return intake.show_loops([Path(path) for path in records], intake.intake_options(options))
     model, records = _inputs(options)
     from stiction_ros.discrepancy import GapOptions, find_discrepancy
 
@@ -104,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
     if options.fit_linear:
-        for path in filter(is_model, options.inputs):
+        for path in filter(intake.is_model, options.inputs):
             raise InputError(
                 "is a loop model", where=path, fix="leave it out, --fit-linear makes one"
             )
@@ -118,7 +105,7 @@ def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
             where="gap",
             fix="write stiction gap MODEL RECORD, or --fit-linear RECORD without a model",
         )
-    if not is_model(options.inputs[0]):
+    if not intake.is_model(options.inputs[0]):
         raise InputError(
             "is no loop model",
             where=options.inputs[0],
@@ -129,7 +116,7 @@ def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
 
 
 def _record(path: str, options: argparse.Namespace) -> Record:
-    loop = opened(argparse.Namespace(**{**vars(options), "record": path}))
+    loop = intake.opened(argparse.Namespace(**{**vars(options), "record": path}))
     return longest_part([only_part(loop.parts, path)])
 
 
@@ -163,7 +150,7 @@ def _print(found: Discrepancy) -> None:
                     f"{value:.5g} {effect.units.get(key, '')}".removesuffix(" 1").rstrip(),
                     "" if ends is None else f"{ends[0]:.5g} to {ends[1]:.5g}",
                     f"{effect.delta_bic:.0f}" if k == 0 else "",
-                    _share(effect.closed) if k == 0 else "",
+                    "" if k or math.isnan(effect.closed) else f"{100.0 * effect.closed:.0f} %",
                 )
         console.print(table)
     elif found.alternatives:
@@ -193,10 +180,6 @@ def _print(found: Discrepancy) -> None:
             console.print(f"not considered: {', '.join(sorted(left))}: {reason}", markup=False)
     for note in found.notes:
         console.print(f"note: {note}", markup=False)
-
-
-def _share(closed: float) -> str:
-    return "" if math.isnan(closed) else f"{100.0 * closed:.0f} %"
 
 
 def _gaps(found: Discrepancy) -> Table:

@@ -13,26 +13,10 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared import searches
 from stiction_ros.cli.shared.as_json import write_json
-from stiction_ros.cli.shared.intake_options import (
-    add_columns,
-    add_intake,
-    intake_options,
-    opened,
-    show_loops,
-    tell,
-)
 from stiction_ros.cli.shared.progress import bar
-from stiction_ros.cli.shared.searches import (
-    add_law,
-    add_search_options,
-    identify_by,
-    input_orders,
-    output_orders,
-    refuse_channel_orders,
-    search_options,
-)
 from stiction_ros.errors import storing
 from stiction_ros.records.parts import longest_part
 from stiction_ros.texts import plural, probability, symbol
@@ -50,51 +34,48 @@ def add(commands: Any) -> None:
         "controller output and measurement, and say which valve sticks. Of a record with gaps "
         "or of several runs the longest good part is taken.",
     )
-    parser.add_argument("record", metavar="RECORD", help="CSV file, other export, or bag")
-    add_columns(parser)
-    add_intake(parser)
-    parser.add_argument(
+    option = parser.add_argument
+    option("record", metavar="RECORD", help="CSV file, other export, or bag")
+    intake.add_columns(parser)
+    intake.add_intake(parser)
+    option(
         "--na",
-        type=output_orders,
+        type=searches.output_orders,
         metavar="N[,N]",
         help="order n_a of the process (default: by BIC); methods of the paper take one order, "
         "or one for each output",
     )
-    parser.add_argument(
+    option(
         "--nb",
-        type=input_orders,
+        type=searches.input_orders,
         metavar="N[,N][/N,N]",
         help="order n_b of the process (default: n_a); methods of the paper take one order, or "
         "one for each valve in a row for each output",
     )
-    parser.add_argument(
+    option(
         "--delay",
         type=delay_range,
         default=(0, 10),
         metavar="LO:HI",
         help="delays to try, samples (0:10)",
     )
-    add_law(parser)
-    parser.add_argument(
+    searches.add_law(parser)
+    option(
         "--kind",
         choices=searches.LOOP_KINDS,
         help="what the loop controls; a note says whether the process found fits it",
     )
-    parser.add_argument(
+    option(
         "--method",
         default="evidence",
         choices=searches.METHODS,
         help="method of identification (default: evidence)",
     )
-    add_search_options(parser)
-    parser.add_argument(
-        "--model", metavar="F.loop.yaml", help="write the identified loop as a loop model"
-    )
-    parser.add_argument(
-        "--why", action="store_true", help="print the figures behind each probability"
-    )
-    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
-    parser.add_argument("--out", metavar="DIR", help="write the page report.html there")
+    searches.add_search_options(parser)
+    option("--model", metavar="F.loop.yaml", help="write the identified loop as a loop model")
+    option("--why", action="store_true", help="print the figures behind each probability")
+    option("--json", metavar="F", help="write the result as JSON; - for stdout")
+    option("--out", metavar="DIR", help="write the page report.html there")
     parser.set_defaults(run=run)
 
 
@@ -110,13 +91,13 @@ def delay_range(text: str) -> tuple[int, int]:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     if options.dry_run:
-        return show_loops([Path(options.record)], intake_options(options))
-    loop = opened(options)
+        return intake.show_loops([Path(options.record)], intake.intake_options(options))
+    loop = intake.opened(options)
     record, parts = longest_part(loop.parts), loop.parts
-    chosen = search_options(options)
+    chosen = searches.search_options(options)
     from stiction_ros.identification import IdentificationOptions
 
-    plain = refuse_channel_orders(options, chosen)
+    plain = searches.refuse_channel_orders(options, chosen)
     settings = IdentificationOptions(
         output_order=plain["na"],
         input_order=plain["nb"],
@@ -124,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
         law=options.law,
         kind=options.kind,
     )
-    search = identify_by(options.method, settings, chosen)
+    search = searches.identify_by(options.method, settings, chosen)
     with bar("identifying") as show:
         found = search(record, show)
     if options.model is not None:
@@ -138,7 +119,7 @@ def run(options: argparse.Namespace) -> int:
         if options.why:
             _print_figures(found)
     else:
-        tell(loop)
+        intake.tell(loop)
     if options.out is not None:
         from stiction_ros.report.record.report import report_record
 

@@ -19,10 +19,7 @@ AGAIN = 0.05  # s, until it is asked again
 
 @contextlib.contextmanager
 def waiting_for_compiler() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt as soon as the main thread has left the compiler.
-
-    Where somebody else handles the signal, or in another thread, nothing changes.
-    """
+    """Let Ctrl-C raise KeyboardInterrupt as soon as the main thread has left the compiler."""
     if (
         threading.current_thread() is not threading.main_thread()
         or signal.getsignal(signal.SIGINT) is not signal.default_int_handler

@@ -23,21 +23,18 @@ def add(commands: Any) -> None:
         description="Read pv and op_applied of every loop in the ROS graph and write one CSV "
         "record a loop, which identify takes. Nothing is published.",
     )
-    parser.add_argument("--seconds", type=float, required=True, help="how long to listen, s")
-    parser.add_argument(
+    option = parser.add_argument
+    option("--seconds", type=float, required=True, help="how long to listen, s")
+    option(
         "--sample-time",
         type=float,
         default=1.0,
         metavar="S",
         help="seconds between samples (default: 1)",
     )
-    parser.add_argument(
-        "--window", type=int, default=5000, metavar="N", help="samples to keep of each loop"
-    )
-    parser.add_argument("--out", metavar="DIR", help="folder of the CSV records; default: none")
-    parser.add_argument(
-        "--json", metavar="F", help="write the number of samples of each loop; - for stdout"
-    )
+    option("--window", type=int, default=5000, metavar="N", help="samples to keep of each loop")
+    option("--out", metavar="DIR", help="folder of the CSV records; default: none")
+    option("--json", metavar="F", help="write the number of samples of each loop; - for stdout")
     parser.set_defaults(run=run)
 
 

@@ -77,11 +77,7 @@ class _Parser(argparse.ArgumentParser):
     """A parser that tells with its own usage what it does not know, and what may be meant."""
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
-        """Return what was parsed; a command leaves nothing to others.
-
-        Raises:
-            SystemExit: there are words that the command does not know.
-        """
+        """Return what was parsed; a command leaves nothing to others."""
         found, spare = super().parse_known_args(args, namespace)
         if spare and self._subparsers is None:
             self.error(self._unknown(spare))
@@ -145,12 +141,7 @@ def _meant(word: str, known: Iterable[str]) -> str:
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
-    """Return the parser of all commands.
-
-    Args:
-        only: the command whose options are known, the others by name alone: no module but its
-            own is imported. None for all.
-    """
+    """Return the parser of all commands, with the options of ``only`` one, or of all."""
     known = _known(only)
     top = _Top({name: text for name, (_, text) in known.items()})
     top.add_argument("--version", action="version", version=f"stiction_ros {__version__}")

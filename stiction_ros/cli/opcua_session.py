@@ -24,11 +24,7 @@ def add_session(parser: argparse.ArgumentParser) -> None:
 
 
 def credentials_of(options: argparse.Namespace) -> Credentials:
-    """Return what the options say, checked.
-
-    Raises:
-        InputError: files that lack or that others may read.
-    """
+    """Return what the options say, checked."""
     found = Credentials.of(options)
     found.check(writes=False)
     return found

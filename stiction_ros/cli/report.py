@@ -6,14 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.shared.intake_options import (
-    add_columns,
-    add_intake,
-    intake_options,
-    opened,
-    show_loops,
-    tell,
-)
+from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.errors import storing
 from stiction_ros.intake.intake import is_bag
 from stiction_ros.records.parts import longest_part
@@ -22,12 +15,11 @@ from stiction_ros.records.parts import longest_part
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        "report",
-        description="Make a self-contained HTML report of a bag, or of a CSV record.",
+        "report", description="Make a self-contained HTML report of a bag, or of a CSV record."
     )
     parser.add_argument("record", metavar="BAG_OR_RECORD", help="bag or CSV file")
-    add_columns(parser)
-    add_intake(parser)
+    intake.add_columns(parser)
+    intake.add_intake(parser)
     parser.add_argument(
         "--out",
         default="report.html",
@@ -50,15 +42,15 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     out = Path(options.out)
     if options.dry_run:
-        return show_loops([Path(options.record)], intake_options(options))
+        return intake.show_loops([Path(options.record)], intake.intake_options(options))
     with storing(out, fix="choose another --out"):
         if is_bag(options.record) and holds_live_run(options.record):
             from stiction_ros.report.run.report import report_run
 
             print(report_run(options.record, out, namespace=options.namespace).page)
         else:
-            loop = opened(options)
-            tell(loop)
+            loop = intake.opened(options)
+            intake.tell(loop)
             record, parts = longest_part(loop.parts), loop.parts
             from stiction_ros.identification import IdentificationOptions, identify
             from stiction_ros.report.record.report import report_record

@@ -81,15 +81,8 @@ def run(options: argparse.Namespace) -> int:
 def by_hand(model: LoopModel, moves: str, seed: int) -> Record:
     """Return the record of a loop of one valve in manual.
 
-    OP rests where the moves end for as long as the first of them is held, and then makes them.
-
-    Args:
-        model: of the loop.
-        moves: CSV file with the columns ``after``, s since the first move, and ``OP``, %.
-        seed: of the noise.
-
-    Raises:
-        InputError: the file is no such table, or the loop has several valves.
+    OP rests where the moves end for as long as the first of them is held, and then makes them. They
+    are those of a CSV file with the columns ``after``, s since the first move, and ``OP``, %.
     """
     with foreign(moves), Path(moves).open(encoding="utf-8", newline="") as file:
         rows = [(float(row["after"]), float(row["OP"])) for row in csv.DictReader(file)]

@@ -14,14 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from stiction_ros.cli.identify import delay_range
+from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared.as_json import write_json
-from stiction_ros.cli.shared.intake_options import (
-    add_columns,
-    add_intake,
-    intake_options,
-    show_loops,
-    tell_strangers,
-)
 from stiction_ros.cli.shared.searches import add_law
 from stiction_ros.cli.survey_list import print_list
 from stiction_ros.cli.survey_progress import progress
@@ -30,8 +24,7 @@ from stiction_ros.intake.sheets.cells import Numbers
 from stiction_ros.intake.sheets.layout import delimiter_of
 from stiction_ros.intake.sheets.text import open_text
 
-LOCAL = "local"
-"""The engine of this machine."""
+LOCAL = "local"  # the engine of this machine
 
 PAGE, CSV, XLSX = "survey.html", "survey.csv", "survey.xlsx"
 
@@ -44,49 +37,40 @@ def add(commands: Any) -> None:
         "service first, with a page for each loop. A loop that cannot be judged stands in the "
         "list with its reason and stops no other.",
     )
-    parser.add_argument("paths", nargs="+", metavar="PATH", help="files and folders of exports")
-    add_columns(parser)
-    add_intake(parser, many=True)
-    parser.add_argument(
-        "--delay", type=delay_range, metavar="LO:HI", help="delays to try, samples (0:10)"
-    )
+    option = parser.add_argument
+    option("paths", nargs="+", metavar="PATH", help="files and folders of exports")
+    intake.add_columns(parser)
+    intake.add_intake(parser, many=True)
+    option("--delay", type=delay_range, metavar="LO:HI", help="delays to try, samples (0:10)")
     add_law(parser)
-    parser.add_argument("--no-gain", action="store_true", help="do not simulate what would help")
-    parser.add_argument(
-        "--cost",
-        metavar="F",
-        help="CSV with columns loop,cost: money per hour and unit of |PV−SP|",
+    option("--no-gain", action="store_true", help="do not simulate what would help")
+    option(
+        "--cost", metavar="F", help="CSV with columns loop,cost: money per hour and unit of |PV−SP|"
     )
-    parser.add_argument(
-        "--units",
-        metavar="F",
-        help="CSV with columns loop,unit: the unit of PV on the pages",
-    )
-    parser.add_argument(
+    option("--units", metavar="F", help="CSV with columns loop,unit: the unit of PV on the pages")
+    option(
         "--previous",
         action="append",
         default=[],
         metavar="F",
         help="JSON of an earlier survey; may be repeated",
     )
-    parser.add_argument("--out", metavar="DIR", help=f"write {PAGE}, {CSV}, {XLSX} and pages there")
-    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
-    parser.add_argument(
+    option("--out", metavar="DIR", help=f"write {PAGE}, {CSV}, {XLSX} and pages there")
+    option("--json", metavar="F", help="write the result as JSON; - for stdout")
+    option(
         "--jobs",
         type=int,
         default=os.cpu_count() or 1,
         metavar="N",
         help="number of processes (all cores)",
     )
-    parser.add_argument(
+    option(
         "--engine",
         default=LOCAL,
         metavar="E",
         help="where to judge: local, or dask://HOST:PORT (local)",
     )
-    parser.add_argument(
-        "--resume", action="store_true", help="go on with the interrupted survey in --out"
-    )
+    option("--resume", action="store_true", help="go on with the interrupted survey in --out")
     parser.set_defaults(run=run)
 
 
@@ -103,9 +87,9 @@ def run(options: argparse.Namespace) -> int:
     for path in paths:
         if not path.exists():
             raise InputError("there is no such file or folder", where=str(path))
-    intake = intake_options(options)
+    reading = intake.intake_options(options)
     if options.dry_run:
-        return show_loops(paths, intake)
+        return intake.show_loops(paths, reading)
     costs = _costs(options.cost)
     units = {name: unit for _, name, unit in _pairs(options.units)}
     identification = IdentificationOptions(law=options.law)
@@ -118,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
             gain=not options.no_gain,
             pages=options.out is not None,
             units=tuple(units.items()),
-            read_by=repr(intake),
+            read_by=repr(reading),
         ),
         None if options.out is None else Path(options.out),
         options.resume,
@@ -126,10 +110,10 @@ def run(options: argparse.Namespace) -> int:
     )
     earlier = _earlier(options.previous)
     engine = _engine(options)
-    again = loops(paths, intake) if options.engine == LOCAL else None
+    again = loops(paths, reading) if options.engine == LOCAL else None
     try:
         with progress(again) as show:
-            found = survey(loops(paths, intake), plan, engine, show)
+            found = survey(loops(paths, reading), plan, engine, show)
     except KeyboardInterrupt:
         if plan.out is not None:
             print("survey: interrupted; --resume goes on", file=sys.stderr)
@@ -139,8 +123,8 @@ def run(options: argparse.Namespace) -> int:
     )
     there = {entry.name for entry in found.entries}
     for file, names in ((options.cost, costs), (options.units, units)):
-        tell_strangers(file, "loop", [name for name in names if name not in there])
-    tell_strangers(options.tags, "export", strange_files(paths, intake))
+        intake.tell_strangers(file, "loop", [name for name in names if name not in there])
+    intake.tell_strangers(options.tags, "export", strange_files(paths, reading))
     if plan.out is not None:
         _write(found, plan.out, earlier)
     if options.json is not None:
@@ -151,13 +135,8 @@ def run(options: argparse.Namespace) -> int:
     if plan.out is not None:
         list_at = f"list: {plan.out / PAGE}"
     print(list_at, file=sys.stderr)
-    return _code(found)
-
-
-def _code(found: Any) -> int:
-    """Return the exit code: 1 where every loop failed."""
-    failed = sum(entry.status.value == "failed" for entry in found.entries)
-    return 1 if failed and failed == len(found.entries) else 0
+    statuses = {entry.status.value for entry in found.entries}
+    return 1 if statuses == {"failed"} else 0
 
 
 def _engine(options: argparse.Namespace) -> Any:
@@ -200,10 +179,7 @@ def _write(found: Any, out: Path, earlier: Sequence[Any]) -> None:
 
 
 def _pairs(file: str | None) -> list[tuple[int, str, str]]:
-    """Return row and first two cells of each row of a table, semicolons or commas between them.
-
-    A first line whose first cell is ``loop``, ``tag`` or ``name`` is a head.
-    """
+    """Return row and first two cells of each row of a table, semicolons or commas between them."""
     if file is None:
         return []
     with foreign(file), open_text(Path(file)) as source:
@@ -218,11 +194,7 @@ def _pairs(file: str | None) -> list[tuple[int, str, str]]:
 
 
 def _costs(file: str | None) -> dict[str, float]:
-    """Return the cost of each loop; numbers are written as in exports, with point or comma.
-
-    Raises:
-        InputError: the file cannot be read, or a cost is no number of 0 or more.
-    """
+    """Return the cost of each loop; numbers are written as in exports, with point or comma."""
     found = {}
     for row, name, text in _pairs(file):
         cells = Numbers(decimal_comma=True)

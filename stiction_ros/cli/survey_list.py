@@ -16,23 +16,13 @@ if TYPE_CHECKING:
     from stiction_ros.survey.pages.trend import Earlier
     from stiction_ros.survey.survey import Survey
 
-SHOWN = 30
-"""Rows of the list that are printed."""
-
-ALWAYS, CAUSE = 3, 6
-"""Columns that stand in the narrowest window, and the first one that is broken between words."""
-
-APART = 2
-"""Blanks between two columns."""
+SHOWN = 30  # rows of the list that are printed
+ALWAYS, CAUSE = 3, 6  # columns that are always there, and the first that is broken between words
+APART = 2  # blanks between two columns
 
 
 def print_list(found: Survey, earlier: Sequence[Earlier]) -> None:
-    """Print the first rows, in the words of the page.
-
-    Args:
-        found: what to print.
-        earlier: surveys before it, the oldest first.
-    """
+    """Print the first rows, in the words of the page; ``earlier`` surveys begin with the oldest."""
     from stiction_ros.survey.listing.headline import changed, headline, worked
     from stiction_ros.survey.pages.words import period
 

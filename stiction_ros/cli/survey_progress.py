@@ -14,26 +14,20 @@ from stiction_ros.cli.shared.progress import bar
 if TYPE_CHECKING:
     from stiction_ros.survey.survey import Reached
 
-Clock = Callable[[], float]
-"""Seconds since any time."""
+Clock = Callable[[], float]  # seconds since any time
 
 SHARE, SECONDS = 0.1, 30.0
 """A line is printed after this share of the loops or this time, whichever comes first, where nobody
 looks at a terminal."""
 
-ENDS_WITHIN = 5.0
-"""Seconds that counting is given to end."""
+ENDS_WITHIN = 5.0  # seconds that counting is given to end
 
 
 class Counted:
     """How many loops there are, counted beside the work."""
 
     def __init__(self, found: Iterable[object]) -> None:
-        """Begin to count.
-
-        Args:
-            found: loops; they are drawn in a thread of its own.
-        """
+        """Begin to count loops, in a thread of their own."""
         self.total: int | None = None
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._count, args=(found,), daemon=True)
@@ -60,13 +54,7 @@ class Forecast:
     def __init__(
         self, show: Callable[[float, str], None], total: Callable[[], int | None], clock: Clock
     ) -> None:
-        """Begin now.
-
-        Args:
-            show: is given the share that is done, and words.
-            total: number of loops; None while it is not known.
-            clock: s.
-        """
+        """Begin now; ``show`` is given the share done, where the total is known, and words."""
         self._show, self._total, self._clock = show, total, clock
         self._begun = clock()
 
@@ -104,8 +92,7 @@ class Lines:
 def progress(found: Iterable[object] | None) -> Iterator[Forecast]:
     """Show how far a survey is: a bar on a terminal, lines elsewhere.
 
-    Args:
-        found: the loops once more, to be counted; None where reading them twice costs too much.
+    The loops are found once more, to be counted; None where reading them twice costs too much.
     """
     counted = None if found is None else Counted(found)
     try:

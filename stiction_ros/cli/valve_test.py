@@ -8,15 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.cli.shared.intake_options import (
-    add_columns,
-    add_intake,
-    intake_options,
-    opened,
-    show_loops,
-    tell,
-)
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.errors import InputError, storing
 from stiction_ros.records.parts import longest_part
@@ -39,31 +32,26 @@ def add(commands: Any) -> None:
         "would decide whether the valve sticks, as a procedure to follow by hand. judge: from the "
         "record of these moves, the verdict, or the next moves.",
     )
-    parser.add_argument("what", choices=("plan", "judge"), help="what to do")
-    parser.add_argument("record", metavar="RECORD|TEST", help="CSV file, other export, or bag")
-    add_columns(parser)
-    add_intake(parser)
-    parser.add_argument(
-        "--before", metavar="RECORD", help="judge: the record that the test was planned from"
-    )
-    parser.add_argument(
-        "--op-limit", type=float, metavar="X", help="how far OP may go from where it is, %%"
-    )
-    parser.add_argument(
-        "--pv-limit", type=float, metavar="X", help="how far PV may go, in its own unit"
-    )
-    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
-    parser.add_argument("--out", metavar="F.csv", help="write the moves: seconds and OP")
+    option = parser.add_argument
+    option("what", choices=("plan", "judge"), help="what to do")
+    option("record", metavar="RECORD|TEST", help="CSV file, other export, or bag")
+    intake.add_columns(parser)
+    intake.add_intake(parser)
+    option("--before", metavar="RECORD", help="judge: the record that the test was planned from")
+    option("--op-limit", type=float, metavar="X", help="how far OP may go from where it is, %%")
+    option("--pv-limit", type=float, metavar="X", help="how far PV may go, in its own unit")
+    option("--json", metavar="F", help="write the result as JSON; - for stdout")
+    option("--out", metavar="F.csv", help="write the moves: seconds and OP")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     if options.dry_run:
-        return show_loops([Path(options.record)], intake_options(options))
+        return intake.show_loops([Path(options.record)], intake.intake_options(options))
     limits = _limits(options)
-    loop = opened(options)
-    tell(loop)
+    loop = intake.opened(options)
+    intake.tell(loop)
     if options.what == "plan":
         from stiction_ros.identification.valve_test.plan import first_round
 
@@ -77,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     before: Facts | None = None
     if options.before is not None:
         given = argparse.Namespace(**(vars(options) | {"record": options.before}))
-        before = _before(longest_part(opened(given).parts), limits)
+        before = _before(longest_part(intake.opened(given).parts), limits)
     record = max(loop.parts, key=len)
     with bar("judging"):
         said = answer(record, before, limits)

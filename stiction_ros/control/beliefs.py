@@ -20,11 +20,7 @@ class ValveBeliefs(Sequence[ValveBelief | None]):
         spreads: Sequence[FrictionSpread | None],
         limits: FloatArray,
     ) -> None:
-        """Take what is given for each of the m valves, with the ``limits`` (m, 2) of their stems.
-
-        Raises:
-            InputError: a law that has no jump form.
-        """
+        """Take what is given for each of the m valves, with ``limits`` (m, 2) of their stems."""
         self._beliefs = tuple(
             None if law is None else ValveBelief(jump_form(law), spread)
             for law, spread in zip(frictions, spreads, strict=True)
@@ -58,10 +54,7 @@ class ValveBeliefs(Sequence[ValveBelief | None]):
         return tuple(None if one is None else one.form for one in self._beliefs)
 
     def intervals(self, stem: FloatArray) -> FloatArray:
-        """Return lowest and highest stem that the past OP allows, shape (m, 2), %.
-
-        ``stem`` (m,) is where the healthy valves are.
-        """
+        """Return lowest and highest stem, (m, 2), %, that the past allows; ``stem`` if healthy."""
         found = np.column_stack([stem, stem])
         for j, belief in self.sticky:
             found[j] = belief.interval

@@ -32,31 +32,17 @@ class CertificateStatus(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Certificate:
-    """The mixed-integer optimum beside a plan.
+    """The mixed-integer optimum beside a plan."""
 
-    Attributes:
-        status: whether the optimum is known.
-        optimum: its cost, in the units of (19a), NaN when not known.
-        gap: cost of the plan above it as a share of it; not below 0; NaN when not known.
-        samples: of the horizon in which jumps were free.
-        nodes: of the search tree.
-    """
-
-    status: CertificateStatus
-    optimum: float
-    gap: float
-    samples: int
-    nodes: int
+    status: CertificateStatus  # whether the optimum is known
+    optimum: float  # its cost, in the units of (19a), NaN when not known
+    gap: float  # cost of the plan above it as a share of it; not below 0; NaN when not known
+    samples: int  # of the horizon in which jumps were free
+    nodes: int  # of the search tree
 
 
 def certify(problem: FreeJumps, state: FloatArray, target: Target, plan: Plan) -> Certificate:
-    """Return how far ``plan`` is from the optimum of ``problem``.
-
-    Args:
-        problem: the loop in which the plan was made, with the stems where they were then.
-        state, target: as given to :meth:`~.embedding.EmbeddingMpc.plan`.
-        plan: to be judged.
-    """
+    """Return how far ``plan``, made at ``state`` and ``target``, is from the optimum."""
     nan = float("nan")
     if not problem.bounded:
         return Certificate(CertificateStatus.UNBOUNDED_TRAVEL, nan, nan, problem.samples, 0)
@@ -98,15 +84,7 @@ class FreeJumps:
         jump_price: float,
         samples: int,
     ) -> None:
-        """Lay out the columns and rows.
-
-        Args:
-            cost, limits: of the embedding.
-            valves: what is known of the valves now.
-            sticky: whether each of the m valves is.
-            jump_price: cost added per jump.
-            samples: 1 … N.
-        """
+        """Lay out columns and rows; ``jump_price`` is added for each jump in 1 … N ``samples``."""
         self.cost, self.limits, self.valves = cost, limits, valves
         self.jump_price, self.samples = jump_price, min(samples, cost.horizon)
         self._is_sticky = tuple(sticky)
@@ -170,12 +148,7 @@ class FreeJumps:
         return np.array(rows).reshape(-1, self.size)
 
     def solve(self, state: FloatArray, target: Target) -> tuple[float | None, int]:
-        """Return the optimum without the constant part of the cost, and the nodes.
-
-        Args:
-            state: ξ̂, shape (n,).
-            target: where outputs and stems should come to rest.
-        """
+        """Return the optimum from ξ̂, (n,), without the cost's constant part, and the nodes."""
         lower, upper = self._bounds(target)
         deviation = self.valves.last - target.stem
         problem = self.qp.problem(

@@ -151,11 +151,7 @@ class MpcController:
         return misfit
 
     def follow(self, history: History) -> None:
-        """Go on behind :meth:`take_over` over the samples since then, all of them answered.
-
-        Args:
-            history: the samples since then, in order.
-        """
+        """Go on behind :meth:`take_over` over the samples of ``history``, all of them answered."""
         if len(history.op):
             self._follow(history, 0, self.valves.apply_op(history.op[0]))
 

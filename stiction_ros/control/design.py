@@ -22,39 +22,24 @@ OtherFormulation = Callable[[ControlMode, UnawareMpc, Sequence[Behaviour | None]
 
 @dataclasses.dataclass(frozen=True)
 class ControlDesign:
-    """Everything a controller is built from, apart from the friction.
+    """Everything a controller is built from, apart from the friction."""
 
-    Attributes:
-        model: the process.
-        limits: bounds; outputs are soft.
-        unaware, embedding: weights of (19a) for either formulation.
-        target_weights: Q_ss, shape (p,).
-        observer: observer tuning.
-        jumps: how sticky valves are moved.
-        hand_over_samples: past samples replayed into the observer of a new controller.
-        fallback: how long a strategy other than the first may stand in.
-        slip_check: whether jumps are watched by a second observer.
-        longest_wait: samples for which a jump waits for the disturbance estimate to come to rest.
-        gap_samples: free samples of the optimality gap of each step; 0 leaves it out.
-        valve_names, output_names: for messages; numbers stand in where empty.
-        others: makes embedding or inversion in place of the exact ones, of its mode, of the unaware
-            formulation and of the friction of each valve, None for a healthy one; None for these.
-    """
-
-    model: LinearModel
-    limits: HorizonLimits
-    unaware: HorizonWeights
+    model: LinearModel  # the process
+    limits: HorizonLimits  # bounds; outputs are soft
+    unaware: HorizonWeights  # unaware, embedding: weights of (19a) for either formulation
     embedding: HorizonWeights
-    target_weights: FloatArray
-    observer: ObserverTuning
-    jumps: EmbeddingTuning = EmbeddingTuning()
-    hand_over_samples: int = 200
-    fallback: FallbackRule = FallbackRule()
-    slip_check: bool = True
-    longest_wait: int = 0
-    gap_samples: int = 0
-    valve_names: tuple[str, ...] = ()
+    target_weights: FloatArray  # Q_ss, shape (p,)
+    observer: ObserverTuning  # observer tuning
+    jumps: EmbeddingTuning = EmbeddingTuning()  # how sticky valves are moved
+    hand_over_samples: int = 200  # past samples replayed into the observer of a new controller
+    fallback: FallbackRule = FallbackRule()  # how long a strategy other than the first may stand in
+    slip_check: bool = True  # whether jumps are watched by a second observer
+    longest_wait: int = 0  # samples for which a jump waits for a resting disturbance estimate
+    gap_samples: int = 0  # free samples of the optimality gap of each step; 0 leaves it out
+    valve_names: tuple[str, ...] = ()  # valve_names, output_names: for messages; or numbers
     output_names: tuple[str, ...] = ()
+    # makes embedding or inversion in place of the exact ones, of its mode, of the unaware
+    # formulation and of the friction of each valve, None for a healthy one; None for these
     others: OtherFormulation | None = None
 
     def without_rates(self) -> ControlDesign:

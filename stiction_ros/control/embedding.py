@@ -9,23 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.control.beliefs import ValveBeliefs
-from stiction_ros.control.certificate import (
-    Certificate,
-    CertificateStatus,
-    FreeJumps,
-    certify,
-)
-from stiction_ros.control.embedding_problem import (
-    EmbeddingProblem,
-    JumpPattern,
-    StickyState,
-)
+from stiction_ros.control.certificate import Certificate, CertificateStatus, FreeJumps, certify
+from stiction_ros.control.embedding_problem import EmbeddingProblem, JumpPattern, StickyState
 from stiction_ros.control.formulation import Formulation
-from stiction_ros.control.horizon import (
-    HorizonCost,
-    HorizonLimits,
-    HorizonWeights,
-)
+from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonWeights
 from stiction_ros.control.horizon_qp import HorizonSolution
 from stiction_ros.control.jump_form import FrictionSpread, JumpForm, jump_form
 from stiction_ros.control.pattern_bounds import PatternBounds
@@ -61,24 +48,20 @@ def patterns(sticky: int) -> tuple[JumpPattern, ...]:
 
 @dataclasses.dataclass(frozen=True)
 class EmbeddingTuning:
-    """How sticky valves are moved.
+    """How sticky valves are moved."""
 
-    Attributes:
-        jump_price: cost added per jump, in the units of the criterion.
-        jump_margin: how far a jump exceeds the smallest one, as a share of f_S, where nothing
-            is known of the uncertainty of the frictions.
-        kick_limits: largest move of each OP in a sample, shape (m,), %, where a valve jumps; the
-            smallest jump is made all the same. Where the rate limit of OP is smaller it counts.
-        move_prices: cost of the smallest jump of each valve, shape (m,), in place of its weight
-            in S; larger jumps cost as their squares; 0 leaves the weight.
-        least_margin: least margin as a share of f_S where their intervals are known; the
-            margin is then the half-width of f_S's interval plus that of f_D's.
-    """
-
-    jump_price: float = 0.0
+    jump_price: float = 0.0  # cost added per jump, in the units of the criterion
+    # how far a jump exceeds the smallest one, as a share of f_S, where nothing is known of the
+    # uncertainty of the frictions
     jump_margin: float = 0.3
+    # least margin as a share of f_S where their intervals are known; the margin is then the
+    # half-width of f_S's interval plus that of f_D's
     least_margin: float = 0.1
+    # largest move of each OP in a sample, shape (m,), %, where a valve jumps; the smallest jump is
+    # made all the same. Where the rate limit of OP is smaller it counts
     kick_limits: FloatArray | None = None
+    # cost of the smallest jump of each valve, shape (m,), in place of its weight in S; larger jumps
+    # cost as their squares; 0 leaves the weight
     move_prices: FloatArray | None = None
 
 
@@ -116,13 +99,7 @@ class EmbeddingMpc(Formulation):
         tuning: EmbeddingTuning,
         spreads: Sequence[FrictionSpread | None] | None = None,
     ) -> None:
-        """Factorise one problem per combination of patterns.
-
-        What a jump costs goes by the frictions that are known now.
-
-        Raises:
-            InputError: no sticky valve, more than three, or a law without a jump form.
-        """
+        """Factorise one problem per combination of patterns, for up to three sticky valves."""
         self.limits, self.tuning = limits, tuning
         self._sticky = [j for j, friction in enumerate(frictions) if friction is not None]
         if not 1 <= len(self._sticky) <= max(SECOND_JUMPS):
@@ -137,7 +114,7 @@ class EmbeddingMpc(Formulation):
         combinations = tuple(
             combination
             for combination in itertools.product(*choices)
-            if _fits(combination, weights.horizon)
+            if all(p is None or p.wait + p.second < weights.horizon for p in combination)
         )
         self._problems = tuple(EmbeddingProblem(self.cost, limits, one) for one in combinations)
         self._jumps = np.array([problem.jumps for problem in self._problems], dtype=float)
@@ -170,12 +147,10 @@ class EmbeddingMpc(Formulation):
         spreads: Sequence[FrictionSpread | None] | None = None,
         interval: FloatArray | None = None,
     ) -> None:
-        """Set what is known of the valves for the plans from now on.
+        """Set what is known of the m valves for the plans from now on.
 
-        Args:
-            forms: jump form of each of the m valves; None for the healthy ones, as before.
-            spreads: half-widths of the intervals of the frictions, None where unknown.
-            interval: lowest and highest stem position, shape (m, 2), %; None when sure.
+        ``interval`` are lowest and highest stem positions, shape (m, 2), %; None when sure. Healthy
+        valves stay healthy.
         """
         tuning = self.tuning
         self.forms = tuple(forms)
@@ -255,13 +230,7 @@ class EmbeddingMpc(Formulation):
     def certificate(
         self, state: FloatArray, target: Target, last: FloatArray, plan: Plan, samples: int
     ) -> Certificate:
-        """Return how far ``plan`` is from the best that any pattern of jumps can do.
-
-        Args:
-            state, target, last: as given to :meth:`plan`.
-            plan: what that returned.
-            samples: of the horizon in which jumps are free, 1 … N.
-        """
+        """Return how far the ``plan`` is from the best of any jumps in the first samples."""
         sticky = [form is not None for form in self.forms]
         price = self.tuning.jump_price
         jumps = FreeJumps(self.cost, self.limits, self.valves(last), sticky, price, samples)
@@ -274,7 +243,3 @@ class EmbeddingMpc(Formulation):
             if form is not None and abs(stem[j] - last[j]) > 0.5 * self._least[j]:
                 op[j] = form.op(float(last[j]), float(stem[j]))
         return np.asarray(np.clip(op, self.limits.stem[:, 0], self.limits.stem[:, 1]))
-
-
-def _fits(combination: tuple[JumpPattern | None, ...], horizon: int) -> bool:
-    return all(p is None or p.wait + p.second < horizon for p in combination)

@@ -6,10 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.control.horizon import (
-    HorizonCost,
-    HorizonLimits,
-)
+from stiction_ros.control.horizon import HorizonCost, HorizonLimits
 from stiction_ros.control.horizon_qp import HorizonQp, HorizonSolution, SharedTerms
 from stiction_ros.control.target import Target
 from stiction_ros.effects.behaviour import FloatArray
@@ -19,17 +16,11 @@ FREE = 1e30
 
 @dataclasses.dataclass(frozen=True)
 class JumpPattern:
-    """Moves of one sticky valve: none, one jump, or a second opposite one later.
+    """Moves of one sticky valve: none, one jump, or a second opposite one later."""
 
-    Attributes:
-        direction: sign of the first jump, 0 for staying.
-        second: samples from the first jump to the opposite one, 0 for none.
-        wait: samples before the first jump.
-    """
-
-    direction: int
-    second: int = 0
-    wait: int = 0
+    direction: int  # sign of the first jump, 0 for staying
+    second: int = 0  # samples from the first jump to the opposite one, 0 for none
+    wait: int = 0  # samples before the first jump
 
     @property
     def jumps(self) -> int:
@@ -39,20 +30,13 @@ class JumpPattern:
 
 @dataclasses.dataclass(frozen=True)
 class StickyState:
-    """What an embedding problem must know of the valves now; entries of healthy ones unused.
+    """What an embedding problem must know of the valves now; entries of healthy ones unused."""
 
-    Attributes:
-        last: stem estimates χ̂, shape (m,), %.
-        interval: lowest and highest stem position that is possible, shape (m, 2), %.
-        least, largest: jump with its margin, shape (m,), %; the least is always allowed.
-        room: distance that a jumping stem must keep from the limits for OP's sake, (m,), %.
-    """
-
-    last: FloatArray
-    interval: FloatArray
-    least: FloatArray
+    last: FloatArray  # stem estimates χ̂, shape (m,), %
+    interval: FloatArray  # lowest and highest stem position that is possible, shape (m, 2), %
+    least: FloatArray  # least, largest: jump with margin, shape (m,), %; the least is allowed
     largest: FloatArray
-    room: FloatArray
+    room: FloatArray  # distance of a jumping stem from the limits, for OP's sake, (m,), %
 
 
 class EmbeddingProblem:
@@ -63,10 +47,7 @@ class EmbeddingProblem:
     """
 
     def __init__(
-        self,
-        cost: HorizonCost,
-        limits: HorizonLimits,
-        combination: tuple[JumpPattern | None, ...],
+        self, cost: HorizonCost, limits: HorizonLimits, combination: tuple[JumpPattern | None, ...]
     ) -> None:
         """Factorise for ``combination``, one pattern per valve, None for a healthy one."""
         self.combination = combination

@@ -15,53 +15,30 @@ class Formulation(abc.ABC):
 
     In every sample :meth:`learn` comes first, then :meth:`reach` bounds the target, then
     :meth:`plan` is asked. One that has nothing to learn or to prepare has a plan only.
-
-    Attributes:
-        mode: what it does about the friction.
-        immobile: valves that it cannot move, by their numbers.
-        waits: whether stems at rest are to stay in this sample where that is feasible; who plans
-            no jumps takes no notice of it.
     """
 
-    mode: ControlMode
-    immobile: tuple[int, ...] = ()
+    mode: ControlMode  # what it does about the friction
+    immobile: tuple[int, ...] = ()  # valves that it cannot move, by their numbers
+    # whether stems at rest are to stay in this sample where that is feasible; who plans no jumps
+    # takes no notice of it
     waits: bool = False
 
     def learn(self, valves: ValveBeliefs, stem: FloatArray) -> None:  # noqa: B027
-        """Take over what is believed of the valves, for the plans from now on.
-
-        Args:
-            valves: the belief in each of the m valves.
-            stem: stem estimates, shape (m,), %.
-        """
+        """Take over what is believed of the m valves, and their stems, (m,), %, for later."""
 
     def reach(self, stem: FloatArray, limits: FloatArray) -> FloatArray:
-        """Return where the stems may be brought to rest, shape (m, 2), %.
-
-        Args:
-            stem: stem estimates, shape (m,), %.
-            limits: of the stems, shape (m, 2), %.
-        """
+        """Return where stems, (m,), %, within ``limits`` may come to rest, (m, 2), %."""
         return limits
 
     @abc.abstractmethod
     def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
-        """Return a plan, or None when there is none.
-
-        Args:
-            state: ξ̂, shape (n,).
-            target: where outputs and stems should come to rest.
-            last: stem estimates, shape (m,), %.
-        """
+        """Return a plan from ξ̂, (n,), and the last stems, (m,), %, to ``target``, or None."""
 
     def optimality_gap(
         self, state: FloatArray, target: Target, last: FloatArray, plan: Plan, samples: int
     ) -> float | None:
         """Return the cost of ``plan`` above the optimum as a share of it, None where unknown.
 
-        Args:
-            state, target, last: as given to :meth:`plan`.
-            plan: what that returned.
-            samples: of the horizon in which the optimum is free, at least 1.
+        The optimum is free in the first ``samples`` of the horizon.
         """
         return None

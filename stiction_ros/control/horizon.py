@@ -14,21 +14,13 @@ ITERATION_LIMIT = 2000
 
 @dataclasses.dataclass(frozen=True)
 class HorizonWeights:
-    """Penalties of (19a).
+    """Penalties of (19a)."""
 
-    Attributes:
-        horizon: N_H, samples.
-        state: Q, shape (n, n).
-        move: S, shape (m, m), on Δχ (which is Δu for valves without friction).
-        terminal: V_F, shape (n, n).
-        look_ahead: samples beyond the horizon in which the last stems stay and Q goes on counting.
-    """
-
-    horizon: int
-    state: FloatArray
-    move: FloatArray
-    terminal: FloatArray
-    look_ahead: int = 0
+    horizon: int  # N_H, samples
+    state: FloatArray  # Q, shape (n, n)
+    move: FloatArray  # S, shape (m, m), on Δχ (which is Δu for valves without friction)
+    terminal: FloatArray  # V_F, shape (n, n)
+    look_ahead: int = 0  # samples beyond the horizon, with stems at rest, that Q counts
 
 
 @dataclasses.dataclass(frozen=True)

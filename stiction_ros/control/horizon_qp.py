@@ -17,34 +17,21 @@ OUT_OF_ITERATIONS = -4  # exit flag of daqp
 
 @dataclasses.dataclass(frozen=True)
 class HorizonSolution:
-    """A plan of one pattern of moves.
+    """A plan of one pattern of moves."""
 
-    Attributes:
-        plan: stems in deviations from the target, shape (N, m).
-        cost: of the plan.
-        slack: by how much outputs break their soft bounds at most, shape (p,).
-        variables: r.
-        pv: outputs at samples 1 … N, shape (N, p), where soft bounds have asked for them.
-    """
-
-    plan: FloatArray
-    cost: float
-    slack: FloatArray
-    variables: FloatArray
-    pv: FloatArray | None = None
+    plan: FloatArray  # stems in deviations from the target, shape (N, m)
+    cost: float  # of the plan
+    slack: FloatArray  # by how much outputs break their soft bounds at most, shape (p,)
+    variables: FloatArray  # r
+    pv: FloatArray | None = None  # outputs at 1 … N, shape (N, p), if soft bounds asked for them
 
 
 @dataclasses.dataclass(frozen=True)
 class SharedTerms:
-    """Products that several programmes of one step share.
+    """Products that several programmes of one step share."""
 
-    Attributes:
-        gradient: of :meth:`HorizonCost.linear`, shape (N m,).
-        curved: Hessian times the offset, shape (N m,).
-    """
-
-    gradient: FloatArray
-    curved: FloatArray
+    gradient: FloatArray  # of ``HorizonCost.linear``, shape (N m,)
+    curved: FloatArray  # Hessian times the offset, shape (N m,)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,10 +58,7 @@ class _Programme:
         self._model, self._ready = daqp.Model(), False
 
     def solve(self, linear: FloatArray) -> tuple[FloatArray, float] | None:
-        """Return x and the optimum within ``lower`` and ``upper``, or None.
-
-        After a failure the factorisation and the active set are dropped.
-        """
+        """Return x and the optimum within ``lower`` and ``upper``, or None, and begin anew."""
         self.limit_reached = False
         if self._load(linear) < 0:
             self._ready = False
@@ -184,7 +168,9 @@ class HorizonQp:
         if (lower > upper).any():
             return None
         if self.size == 0:
-            return self._only_plan(state, offset, base, target_pv)
+            plan = offset.reshape(self.cost.horizon, -1)  # nothing is left to decide
+            slack = self.slack(state, plan, target_pv)
+            return HorizonSolution(plan, base + self.slack_cost(slack), slack, np.zeros(0))
         self._hard.lower[:], self._hard.upper[:] = lower, upper
         found = self._solved(self._hard, linear)
         if found is None:
@@ -226,14 +212,6 @@ class HorizonQp:
         soft = self._soft
         return QpData(soft.hessian, linear, soft.matrix, soft.lower, soft.upper)
 
-    def _only_plan(
-        self, state: FloatArray, offset: FloatArray, cost: float, target_pv: FloatArray
-    ) -> HorizonSolution:
-        """Return the plan of a pattern that leaves nothing to decide."""
-        plan = offset.reshape(self.cost.horizon, -1)
-        slack = self.slack(state, plan, target_pv)
-        return HorizonSolution(plan, cost + self.slack_cost(slack), slack, np.zeros(0))
-
     def slack(self, state: FloatArray, plan: FloatArray, target_pv: FloatArray) -> FloatArray:
         """Return by how much ``plan`` (N, m) breaks the soft bounds, shape (p,)."""
         pv = (self.cost.outputs(state, plan) + target_pv)[:, self._bounded]
@@ -270,10 +248,7 @@ class HorizonQp:
 
 
 def slack_weights(cost: HorizonCost) -> FloatArray:
-    """Return the weight of the squared slack of each output, halved in the cost, shape (p,).
-
-    It is the same for every pattern of moves, or their costs would not compare.
-    """
+    """Return the weight, halved in the cost, of each output's squared slack, shape (p,)."""
     reach = (cost.forced_output**2).sum(axis=(0, 2))
     scale = float(np.trace(cost.hessian)) / np.maximum(reach, 1e-300)
     return np.asarray(SLACK_WEIGHT * cost.horizon * scale)

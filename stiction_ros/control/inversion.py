@@ -26,11 +26,7 @@ class InversionMpc(Formulation):
     mode = ControlMode.INVERSION
 
     def __init__(self, linear: UnawareMpc, frictions: Sequence[Behaviour | None]) -> None:
-        """Wrap ``linear``; ``frictions`` has one entry per valve, None for a healthy one.
-
-        Raises:
-            InputError: a law without a jump form.
-        """
+        """Wrap ``linear``; ``frictions`` has one entry per valve, None for a healthy one."""
         self.linear = linear
         self.forms: tuple[JumpForm | None, ...] = tuple(
             None if friction is None else jump_form(friction) for friction in frictions

@@ -10,11 +10,7 @@ __all__ = ["FrictionSpread", "JumpForm", "jump_form"]
 
 
 def jump_form(law: Behaviour) -> JumpForm:
-    """Return the jump form of a law of stiction.
-
-    Raises:
-        InputError: the law has none; the smoothed laws move a little at any OP.
-    """
+    """Return the jump form of a law of stiction; InputError for a law that has none."""
     form = law.jump_form() if isinstance(law, Stiction) else None
     if form is None:
         known = [kind.law for kind in behaviours() if kind.law and _jumps(kind)]

@@ -22,12 +22,6 @@ def formulation_of(
 ) -> Formulation | None:
     """Return the formulation of ``mode``; None for ``hold``, which plans nothing.
 
-    Args:
-        mode: what is asked for.
-        design: of the controller.
-        unaware: the formulation without friction, which the inversion is built upon.
-        valves: the belief in each valve.
-
     Raises:
         InputError: the formulation cannot be set up for these valves, or the rate limit of an OP
             is below what the smallest jump of its valve takes.

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
-from stiction_ros.control.innovation_gate import InnovationGate
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
+
+FORGETTING = 0.98  # of the running mean square of what was passed on
+LIVELY = 2.0  # innovations beyond this many times the usual one count as no more than that
 
 
 class ObserverKind(enum.StrEnum):
@@ -25,25 +27,15 @@ class ObserverKind(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class ObserverTuning:
-    """Covariances relative to the measurement noise, or the Luenberger gain.
+    """Covariances relative to the measurement noise, or the Luenberger gain."""
 
-    Attributes:
-        kind: Kalman filter, or the Luenberger observer with K_x = 0 and K_d = gain · I.
-        state_noise: variance of stem-like noise that enters through B, in %².
-        disturbance_noise: variance of the random walk of d, per output, in (units of PV)².
-        measurement_noise: variance of the measurement noise, per output, in (units of PV)².
-        gain: K_d of the Luenberger observer, 0 < gain ≤ 1; 1 is deadbeat and jitters.
-        gate: innovations beyond this many standard deviations are outliers; inf takes all.
-        gate_samples: successive outliers of one output after which they are taken for true.
-    """
-
-    kind: ObserverKind
-    state_noise: float
-    disturbance_noise: FloatArray
-    measurement_noise: FloatArray
-    gain: float = 0.2
-    gate: float = 20.0
-    gate_samples: int = 3
+    kind: ObserverKind  # Kalman filter, or the Luenberger observer with K_x = 0 and K_d = gain · I
+    state_noise: float  # variance of stem-like noise that enters through B, in %²
+    disturbance_noise: FloatArray  # variance of the random walk of d, per output, in (units of PV)²
+    measurement_noise: FloatArray  # variance of measurement noise, per output, in (units of PV)²
+    gain: float = 0.2  # K_d of the Luenberger observer, 0 < gain ≤ 1; 1 is deadbeat and jitters
+    gate: float = 20.0  # standard deviations from which innovations are outliers; inf takes all
+    gate_samples: int = 3  # successive outliers of one output after which they are taken for true
 
 
 class Observer:
@@ -55,15 +47,11 @@ class Observer:
         \hat\xi_{k+1} &= A \hat\xi_k^+ + B (\hat\chi_k - \chi_0) + E w_k + g
 
     Feed it the stem positions that the controller believes in, not OP. An innovation that
-    the :class:`~stiction_ros.control.innovation_gate.InnovationGate` holds back counts as 0.
+    the :class:`~stiction_ros.control.observer.InnovationGate` holds back counts as 0.
     """
 
     def __init__(self, model: LinearModel, tuning: ObserverTuning) -> None:
-        """Design the gain.
-
-        Raises:
-            InputError: the augmented model is not detectable, so no offset-free control.
-        """
+        """Design the gain; InputError when the augmented model is not detectable."""
         _check_detectable(model)
         self.model = model
         n, p = model.order, len(model.pv0)
@@ -99,8 +87,7 @@ class Observer:
     def misfit(self) -> float:
         """The last innovation squared and weighed by its expected covariance.
 
-        Beyond the width of the gate it counts as on it, whether it is held back or not: what is
-        held back is no good fit, and an outlier is as bad for every observer that meets it.
+        Beyond the width of the gate it counts as on it, whether it is held back or not.
         """
         seen = np.clip(self._seen, -self._outlier, self._outlier)
         return float(seen @ self._weight @ seen)
@@ -192,3 +179,35 @@ def _luenberger(model: LinearModel, tuning: ObserverTuning) -> FloatArray:
     gain = np.zeros((n + p, p))
     gain[n:] = tuning.gain * np.eye(p)
     return gain
+
+
+class InnovationGate:
+    """Holds back innovations that are far too large, until they last.
+
+    The gate of an output stands at ``width`` times its expected standard deviation, or that
+    of the innovations passed on lately where it is larger, so that a noise that was given
+    too small does not close it. It widens by 3 % a sample at most, so that bad values do not
+    open it for others. After ``patience`` successive samples beyond it the change is real and
+    is passed on in growing portions, one gate width more at each sample, until an innovation
+    fits again: a step of a few units passes at once, a value out of all proportion does not.
+    """
+
+    def __init__(self, deviation: FloatArray, width: float, patience: int) -> None:
+        """Start open; ``deviation`` (p,) in the units of PV, all positive."""
+        self._floor = self._usual = deviation
+        self._width, self._patience = width, patience
+        self._beyond = np.zeros(len(deviation), dtype=int)
+        self.closed: NDArray[np.bool_] = np.zeros(len(deviation), dtype=bool)
+
+    def pass_on(self, innovation: FloatArray) -> FloatArray:
+        """Return ``innovation`` (p,) with 0 for every output that is held back."""
+        size = np.abs(innovation)
+        wild = size > self._width * np.maximum(self._floor, self._usual)
+        self._beyond = np.where(wild, self._beyond + 1, 0)
+        self.closed = wild & (self._beyond <= self._patience)
+        # Only what fits widens the gate, and slowly, or a lasting fault would open it for good.
+        usual = np.maximum(self._floor, self._usual)
+        calm = np.where(wild, self._usual, np.minimum(size, LIVELY * usual))
+        self._usual = np.hypot(np.sqrt(FORGETTING) * self._usual, np.sqrt(1 - FORGETTING) * calm)
+        portion = np.where(wild, (self._beyond - self._patience) * self._width * usual, np.inf)
+        return np.where(self.closed, 0.0, np.clip(innovation, -portion, portion))

@@ -39,12 +39,7 @@ class Passage:
         self._mean = (1.0 - SHARE) * before + SHARE * bounded
 
     def waits(self, stem: FloatArray, sp: FloatArray) -> bool:
-        """Return whether a jump should wait in this sample.
-
-        Args:
-            stem: estimates of the sticky stems, shape (s,), %.
-            sp: set-points, shape (p,).
-        """
+        """Return whether a jump should wait now, by stems, (s,), %, and set-points, (p,)."""
         if not self.longest or not len(stem):
             return False
         rests = self._stem is not None and bool(np.abs(stem - self._stem).max() <= 1e-6)

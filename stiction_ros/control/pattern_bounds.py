@@ -29,13 +29,8 @@ class PatternBounds:
     """
 
     def __init__(self, cost: HorizonCost, combinations: Sequence[Combination]) -> None:
-        """Eliminate the moves of the healthy valves, and note which jumps each pattern makes.
-
-        The loops are compiled here, so that no control step waits for it.
-        """
-        from stiction_ros.control.box_bounds import (
-            box_bounds,  # compiled: slow to import
-        )
+        """Eliminate the moves of healthy valves, note each pattern's jumps, compile the loops."""
+        from stiction_ros.control.box_bounds import box_bounds  # compiled: slow to import
 
         width, horizon = len(combinations[0]), cost.horizon
         healthy = np.array([pattern is None for pattern in combinations[0]])
@@ -71,13 +66,7 @@ class PatternBounds:
         self._bounds(np.zeros(self._count), np.zeros(shape), np.ones(shape))
 
     def of(self, gradient: FloatArray, deviation: FloatArray, valves: StickyState) -> FloatArray:
-        """Return a lower bound for every combination, shape (P,).
-
-        Args:
-            gradient: of the cost at the target, shape (N m,).
-            deviation: χ̂ − χ_ss, shape (m,).
-            valves: what is known of them.
-        """
+        """Return a lower bound for every combination, (P,), by gradient and χ̂ − χ_ss, (m,)."""
         linear = self._map @ gradient
         c, whole = self._count, self._whole
         base = deviation @ (0.5 * whole[c:, c:] @ deviation + linear[c:])

@@ -45,27 +45,17 @@ class StepStatus(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """What a formulation wants.
+    """What a formulation wants."""
 
-    Attributes:
-        op: the first controller output, shape (m,), %.
-        stem: stem positions over the horizon, shape (N, m), %.
-        pv: outputs at samples 0 … N, shape (N + 1, p).
-        slack: violation of the soft output bounds, shape (p,).
-        jumps: number of valve jumps planned over the horizon.
-        converged: whether the solver finished; otherwise the plan was checked instead.
-        cost: value of (19a) with the prices of jumps and slacks, NaN when not known.
-        process_input: what the observer takes for the stem at the first sample, shape (m,), %;
-            None for the stem that the valve models expect of ``op``.
-    """
-
-    op: FloatArray
-    stem: FloatArray
-    pv: FloatArray
-    slack: FloatArray
-    jumps: int = 0
-    converged: bool = True
-    cost: float = float("nan")
+    op: FloatArray  # the first controller output, shape (m,), %
+    stem: FloatArray  # stem positions over the horizon, shape (N, m), %
+    pv: FloatArray  # outputs at samples 0 … N, shape (N + 1, p)
+    slack: FloatArray  # violation of the soft output bounds, shape (p,)
+    jumps: int = 0  # number of valve jumps planned over the horizon
+    converged: bool = True  # whether the solver finished; otherwise the plan was checked instead
+    cost: float = float("nan")  # value of (19a) with prices of jumps and slacks, NaN if unknown
+    # what the observer takes for the stem at the first sample, shape (m,), %; None for the stem
+    # that the valve models expect of ``op``
     process_input: FloatArray | None = None
 
 

@@ -16,26 +16,16 @@ LONGEST = 30  # samples after which an undecided check is given up
 
 @dataclasses.dataclass(frozen=True)
 class Stayed:
-    """A planned jump that did not happen.
+    """A planned jump that did not happen."""
 
-    Attributes:
-        valve: its index.
-        static_friction: largest |OP − χ| at which the stem has stayed, %.
-        stem: where it is, %.
-        observer: the observer that has known so from the beginning.
-    """
-
-    valve: int
-    static_friction: float
-    stem: float
-    observer: Observer
+    valve: int  # its index
+    static_friction: float  # largest |OP − χ| at which the stem has stayed, %
+    stem: float  # where it is, %
+    observer: Observer  # the observer that has known so from the beginning
 
 
 class _Rival:
-    """The assumption that one valve stayed, followed sample by sample.
-
-    A later, larger OP may have moved it, or not: a *stuck* rival stays whatever OP does.
-    """
+    """The assumption that one valve stayed; a *stuck* one stays whatever OP does later."""
 
     def __init__(self, observer: Observer, belief: ValveBelief, op: float, stuck: bool) -> None:
         self.observer = observer.copy()

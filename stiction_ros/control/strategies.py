@@ -26,40 +26,24 @@ from stiction_ros.effects.behaviour import FloatArray
 
 @dataclasses.dataclass(frozen=True)
 class FallbackRule:
-    """How long a strategy may stand in.
+    """How long a strategy may stand in."""
 
-    Attributes:
-        hold_after: K, oldest age of a plan that is followed on, samples; then OP is held.
-        fallback_after: samples held until OP goes to ``fallback_op``; 0 holds for ever.
-        fallback_op: where it goes, shape (m,), %; None where it never does.
-        fallback_rate: largest move on the way there, shape (m,), % per sample.
-    """
-
-    hold_after: int = 5
-    fallback_after: int = 0
-    fallback_op: FloatArray | None = None
-    fallback_rate: FloatArray | None = None
+    hold_after: int = 5  # K, oldest age of a plan that is followed on, samples; then OP is held
+    fallback_after: int = 0  # samples held until OP goes to ``fallback_op``; 0 holds for ever
+    fallback_op: FloatArray | None = None  # where it goes, shape (m,), %; None where it never does
+    fallback_rate: FloatArray | None = None  # largest move on the way, shape (m,), % per sample
 
 
 @dataclasses.dataclass(frozen=True)
 class Situation:
-    """What one step has to go by.
+    """What one step has to go by."""
 
-    Attributes:
-        state: ξ̂, shape (n,).
-        target: None when there is none, or when the inputs cannot be used.
-        last: stem estimates, shape (m,), %.
-        applied: the OP applied last, shape (m,), %.
-        forms: jump forms of the valves, None for those taken to be healthy.
-        trouble: why there is no target; empty when there is one.
-    """
-
-    state: FloatArray
-    target: Target | None
-    last: FloatArray
-    applied: FloatArray
-    forms: Sequence[JumpForm | None]
-    trouble: str
+    state: FloatArray  # ξ̂, shape (n,)
+    target: Target | None  # None when there is none, or when the inputs cannot be used
+    last: FloatArray  # stem estimates, shape (m,), %
+    applied: FloatArray  # the OP applied last, shape (m,), %
+    forms: Sequence[JumpForm | None]  # jump forms of the valves, None for those taken to be healthy
+    trouble: str  # why there is no target; empty when there is one
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,13 +65,7 @@ class Strategies:
     def __init__(
         self, formulation: Formulation | None, stand_in: Formulation | None, rule: FallbackRule
     ) -> None:
-        """Begin without a past.
-
-        Args:
-            formulation: in force; None for the mode ``hold``.
-            stand_in: the unaware controller, where ``formulation`` is another.
-            rule: how long the strategies may stand in.
-        """
+        """Begin without a past; ``stand_in`` is the unaware controller, if not in force."""
         self._formulation, self._stand_in, self._rule = formulation, stand_in, rule
         self._plan: Plan | None = None
         self._age = self._held = 0

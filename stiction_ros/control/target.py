@@ -20,23 +20,15 @@ PROXIMAL = 1e-5
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """A steady state of the model.
+    """A steady state of the model."""
 
-    Attributes:
-        state: ξ_ss, shape (n,).
-        stem: χ_ss, shape (m,), %.
-        pv: the outputs there, shape (p,).
-        reachable: whether ``pv`` meets the set-points.
-        miss: SP − pv, shape (p,), zero when reachable.
-        path: with a preview of the set-points, the steady states of the samples 1 … N of the
-            horizon less ``state``, shape (N, n); None when they are all the same.
-    """
-
-    state: FloatArray
-    stem: FloatArray
-    pv: FloatArray
-    reachable: bool
-    miss: FloatArray
+    state: FloatArray  # ξ_ss, shape (n,)
+    stem: FloatArray  # χ_ss, shape (m,), %
+    pv: FloatArray  # the outputs there, shape (p,)
+    reachable: bool  # whether ``pv`` meets the set-points
+    miss: FloatArray  # SP − pv, shape (p,), zero when reachable
+    # with a preview of the set-points, the steady states of the samples 1 … N of the horizon less
+    # ``state``, shape (N, n); None when they are all the same
     path: FloatArray | None = None
 
 
@@ -50,10 +42,8 @@ class TargetSelector:
     def __init__(self, model: LinearModel, weights: FloatArray, limits: FloatArray) -> None:
         """Prepare for ``weights`` (p,) on the outputs and ``limits`` (m, 2) on the stems.
 
-        The attribute ``limits`` may be replaced later, as by a valve that cannot move.
-
-        Raises:
-            InputError: the model has no steady state that its valves can move.
+        The attribute ``limits`` may be replaced, as by a valve that cannot move. A model without a
+        steady state that its valves can move is refused.
         """
         self.model = model
         self.limits = limits

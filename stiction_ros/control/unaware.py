@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.control.formulation import Formulation
-from stiction_ros.control.horizon import (
-    HorizonCost,
-    HorizonLimits,
-    HorizonWeights,
-)
+from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonWeights
 from stiction_ros.control.horizon_qp import HorizonQp, HorizonSolution
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.control.target import Target
@@ -77,22 +73,9 @@ class UnawareMpc(Formulation):
         pv = predicted_outputs(self.cost, state, target, found)
         return Plan(op, stem, pv, found.slack, converged=converged, cost=cost)
 
-    def _cost(
-        self,
-        state: FloatArray,
-        target: Target,
-        last: FloatArray,
-        moved: FloatArray,
-        slack: FloatArray,
-    ) -> float:
-        z, before, v = state - target.state, last - target.stem, moved.reshape(-1)
-        linear = self.cost.linear(z, before, target.path)
-        total = float(v @ (0.5 * self.cost.hessian @ v + linear))
-        return total + self.cost.constant(z, before, target.path) + self._qp.slack_cost(slack)
-
     def _cut_plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
-        before = last - target.stem
-        linear = self.cost.linear(state - target.state, before, target.path)
+        z, before = state - target.state, last - target.stem
+        linear = self.cost.linear(z, before, target.path)
         free = np.linalg.solve(self.cost.hessian, -linear).reshape(self.cost.horizon, -1)
         low, high = (self.limits.stem - target.stem[:, None]).T
         cut = np.empty_like(free)
@@ -104,10 +87,11 @@ class UnawareMpc(Formulation):
             cut[i] = stem
         stay = np.tile(np.clip(before, low, high), (self.cost.horizon, 1))
         both = []
-        for v in (cut, stay):
-            slack = self._qp.slack(state - target.state, v, target.pv)
-            cost = self._cost(state, target, last, v, slack)
-            found = HorizonSolution(v, cost, slack, v.reshape(-1))
+        for plan in (cut, stay):
+            v, slack = plan.reshape(-1), self._qp.slack(z, plan, target.pv)
+            cost = float(v @ (0.5 * self.cost.hessian @ v + linear))
+            cost = cost + self.cost.constant(z, before, target.path) + self._qp.slack_cost(slack)
+            found = HorizonSolution(plan, cost, slack, v)
             both.append(self._plan(state, target, found, cost, converged=False))
         if not np.isfinite(both[0].cost) or both[0].cost > both[1].cost:
             return None

@@ -143,9 +143,5 @@ def from_mapping(values: Mapping[str, Any]) -> Behaviour:
 
 
 def about(effect: str) -> type[Behaviour]:
-    """Return the class that says what is known of an effect, whatever its law.
-
-    Args:
-        effect: its name; of one that is in no catalogue nothing is known.
-    """
+    """Return the class that says what is known of an effect, whatever its law."""
     return next((kind for kind in behaviours() if kind.effect == effect), Behaviour)

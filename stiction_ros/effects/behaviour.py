@@ -1,8 +1,4 @@
-"""What every effect is: a named behaviour with parameters, units and bounds.
-
-A friction law, a hidden fault and a candidate of the discrepancy catalogue are the same
-thing: a frozen dataclass in a file of its own that derives from :class:`Behaviour`.
-"""
+"""What every effect is: a frozen dataclass with parameters, units and bounds, in its own file."""
 
 from __future__ import annotations
 
@@ -39,22 +35,14 @@ def elapsed(before: float, now: float) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """One parameter of a behaviour, as YAML and reports name it.
+    """One parameter of a behaviour, as YAML and reports name it."""
 
-    Attributes:
-        key: name in YAML, such as ``f_s``.
-        attribute: name in Python, such as ``static_friction``.
-        unit: engineering unit, ``%`` of travel for valves.
-        low, high: closed range of accepted values.
-        description: one line for people.
-    """
-
-    key: str
-    attribute: str
-    unit: str
-    low: float
+    key: str  # name in YAML, such as ``f_s``
+    attribute: str  # name in Python, such as ``static_friction``
+    unit: str  # engineering unit, ``%`` of travel for valves
+    low: float  # low, high: closed range of accepted values
     high: float
-    description: str
+    description: str  # one line for people
 
 
 def parameter(
@@ -121,11 +109,7 @@ class Behaviour(ABC):
     told_of_step: ClassVar[tuple[str, ...]] = ("simulate_grid", "filter")
 
     def __init_subclass__(cls) -> None:
-        """Take back what a base class said of its own :meth:`step` where this one has another.
-
-        So a law that is derived from a neighbour is never simulated on grids, certified or
-        controlled as that neighbour.
-        """
+        """Take back what a base class said of its own :meth:`step` where this one has another."""
         super().__init_subclass__()
         if "step" not in cls.__dict__:
             return
@@ -153,11 +137,7 @@ class Behaviour(ABC):
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
-        """Build from YAML keys; unknown and missing keys raise :class:`InputError`.
-
-        Args:
-            values: parameters by their keys in YAML, without ``effect`` and ``law``.
-        """
+        """Build from ``values`` by YAML keys; unknown and missing keys raise InputError."""
         known = {entry.key: entry.attribute for entry in cls.parameters()}
         for key in values:
             if key not in known:
@@ -191,15 +171,12 @@ class Behaviour(ABC):
 
     @abstractmethod
     def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
-        """Advance one sample.
+        """Advance one sample; return the new memory and the outgoing signal.
 
         Args:
             memory: what :meth:`rest` or the last step returned.
             value: the incoming signal.
             time: seconds since the first sample.
-
-        Returns:
-            The new memory and the outgoing signal.
         """
 
     def simulate(
@@ -236,33 +213,22 @@ class Behaviour(ABC):
         return np.stack([cls(*row).simulate(values, at, sample_time) for row, at in rows], axis=1)
 
     def filter(self, sample_time: float) -> Filter | None:
-        """Return the behaviour as a filter of samples ``sample_time`` seconds apart.
-
-        Returns:
-            None for one that is not linear, or that changes with time.
-        """
+        """Return the filter of samples ``sample_time`` s apart; None if not linear, or changing."""
         return None
 
     @classmethod
     def axes(cls, seen: Seen) -> tuple[Axis, ...]:
         """Return on which figures ``stiction gap`` searches it: one per parameter, in order.
 
-        Args:
-            seen: the signal that it would act on.
-
-        Returns:
-            Nothing for what is not searched; :attr:`not_searched` then says why.
+        It would act on the signal ``seen``; without axes :attr:`not_searched` says why.
         """
         return ()
 
     @classmethod
     def reference(cls, seen: Seen) -> tuple[float, ...]:
-        """Return figures of engineering size, in the order of the axes; what is left out is 0.
+        """Return figures of engineering size for a ``seen`` signal, in the order of axes.
 
         ``stiction gap`` says of a record whether an effect of this size would show in it.
-
-        Args:
-            seen: the signal that it would act on.
         """
         return tuple(
             float(axis.outer(np.array([0.5 * (axis.inner(axis.low) + axis.inner(axis.high))]))[0])
@@ -272,17 +238,12 @@ class Behaviour(ABC):
 
 @dataclasses.dataclass(frozen=True)
 class Filter:
-    """z⁺ = A z + B x, y = C z + D x with z = 0 at rest at x = 0.
+    """z⁺ = A z + B x, y = C z + D x with z = 0 at rest at x = 0."""
 
-    Attributes:
-        a, b, c: shapes (n, n), (n,), (n,); n may be 0.
-        d: direct gain.
-    """
-
-    a: FloatArray
+    a: FloatArray  # a, b, c: shapes (n, n), (n,), (n,); n may be 0
     b: FloatArray
     c: FloatArray
-    d: float
+    d: float  # direct gain
 
 
 @runtime_checkable

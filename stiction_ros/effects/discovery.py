@@ -1,13 +1,7 @@
-"""Which behaviours there are: found by their folder, by entry point, or made known by hand.
+"""Which behaviours there are: found by their folder, by entry point, or by :func:`register`.
 
-An effect is one file with one class (or a few). It is known as soon as it lies in one of
-
-- the folders of this package, one per place;
-- ``stiction_ros/effects/own``, and the folders that the environment variable
-  ``STICTION_EFFECTS`` lists, separated as in PATH;
-- a module that an installed package names as an entry point of ``stiction_ros.effects``;
-
-or when :func:`register` was called with its class.
+The folders are those of this package, one per place, and those that ``STICTION_EFFECTS`` lists;
+entry points name modules in the group ``stiction_ros.effects``.
 """
 
 from __future__ import annotations
@@ -33,12 +27,6 @@ _registered: list[type[Behaviour]] = []
 
 def register(kind: type[Behaviour]) -> type[Behaviour]:
     """Make a behaviour known to this process; also as a decorator.
-
-    Args:
-        kind: its class.
-
-    Raises:
-        InputError: another behaviour has its name.
 
     Examples:
         >>> from stiction_ros import effects

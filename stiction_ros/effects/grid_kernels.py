@@ -127,9 +127,8 @@ def slope_step(
 ) -> None:
     """Move valves by Choudhury's rules, by a sample, OP and f_D of shape (G,).
 
-    Args:
-        memory: χ, u, v, x_ss and both thresholds, below 0 while a valve moves, shape (6, G).
-        ends: S and J, shape (2, G).
+    The memory is χ, u, v, x_ss and both thresholds, below 0 while a valve moves, shape (6, G); the
+    ``ends`` are S and J, shape (2, G).
     """
     for g in range(len(values)):
         slope, before = np.sign(values[g] - memory[1, g]), memory[2, g]
@@ -181,11 +180,7 @@ def he_stems(
 
 @compiled
 def semi_physical_stems(
-    static: FloatArray,
-    dynamic: FloatArray,
-    overshoot: FloatArray,
-    u: FloatArray,
-    start: FloatArray,
+    static: FloatArray, dynamic: FloatArray, overshoot: FloatArray, u: FloatArray, start: FloatArray
 ) -> FloatArray:
     """Return stems, shape (N, G), of valves (f_S, f_D, K) that rest at ``start``, (G,)."""
     count, size = len(u), len(static)

@@ -12,11 +12,7 @@ from stiction_ros.errors import InputError
 
 @dataclasses.dataclass(frozen=True)
 class Limits(Behaviour):
-    """y = min(max(x, low), high), without memory.
-
-    Raises:
-        InputError: limits that are not finite, or low > high.
-    """
+    """y = min(max(x, low), high), without memory."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

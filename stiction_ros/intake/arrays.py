@@ -21,13 +21,12 @@ from stiction_ros.intake.sheets.sheet import PIECE, Piece, Sheet
 from stiction_ros.intake.sheets.stamps import DateOrder
 from stiction_ros.intake.tables.plan import plan_of
 from stiction_ros.intake.tables.reading import blocks_of
-from stiction_ros.records.csv_names import column_name
+from stiction_ros.records.csv_writer import column_name
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 from stiction_ros.texts import plural
 
-EMPTY = frozenset(("None", "nan", "NaN", "NaT", "<NA>"))
-"""What missing values are as texts."""
+EMPTY = frozenset(("None", "nan", "NaN", "NaT", "<NA>"))  # what missing values are as texts
 
 _WORDS: Mapping[str, type[enum.StrEnum]] = {
     "op_unit": OpUnit,
@@ -48,15 +47,7 @@ _AS_ARGUMENTS = (
 
 
 class ColumnSheet(Sheet):
-    """Columns in memory.
-
-    Args:
-        name: for errors.
-        columns: name to values, shape (N,) each: numbers, times or texts.
-
-    Raises:
-        InputError: columns that are not of one length.
-    """
+    """Columns in memory by name, shape (N,) each: numbers, times or texts."""
 
     row_word = "row"
 
@@ -83,15 +74,7 @@ def record_from_arrays(
     name: str,
     op_unit: str | None,
 ) -> Record:
-    """Return :meth:`stiction_ros.records.record.Record.from_arrays`.
-
-    Args:
-        time: as there.
-        signals: arrays of op, pv, sp and stem, as there.
-        tags: given tags of the valves, ``V``, and the outputs, ``PV``.
-        name: of the record.
-        op_unit: as there.
-    """
+    """Return :meth:`stiction_ros.records.record.Record.from_arrays`, with its arguments."""
     step = np.ndim(time) == 0
     if step and not (np.asarray(time).dtype.kind in "iuf" and 0 < time < np.inf):
         raise InputError(
@@ -130,15 +113,7 @@ def record_from_arrays(
 def record_from_frame(
     frame: Any, columns: Mapping[str, Any], time: Any, name: str, options: Mapping[str, Any]
 ) -> Record:
-    """Return :meth:`stiction_ros.records.record.Record.from_dataframe`.
-
-    Args:
-        frame: as there.
-        columns: of op, pv, sp and stem, as there.
-        time: as there.
-        name: of the record.
-        options: how to read it, by the names of its arguments.
-    """
+    """Return :meth:`stiction_ros.records.record.Record.from_dataframe`, with its arguments."""
     keys = getattr(frame, "columns", frame)
     if keys is frame and not isinstance(frame, Mapping):
         raise InputError(

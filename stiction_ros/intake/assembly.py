@@ -11,22 +11,12 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError, foreign
+from stiction_ros.intake import repairs
 from stiction_ros.intake.clocks import put_right
 from stiction_ros.intake.intake_options import IntakeOptions
 from stiction_ros.intake.loop import Loop
 from stiction_ros.intake.modes import manual_marked
 from stiction_ros.intake.plausible import in_percent, refuse_swapped, refuse_twice
-from stiction_ros.intake.repairs import (
-    Rules,
-    checked,
-    each,
-    filled,
-    in_order,
-    sorted_rows,
-    with_times,
-    with_values,
-    without_outliers,
-)
 from stiction_ros.intake.reported import at_pv, is_reported, on_grid
 from stiction_ros.intake.shown import columns_of, modes_of, spreads_of
 from stiction_ros.intake.tables.block import Block, joined
@@ -38,19 +28,13 @@ from stiction_ros.texts import plural
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """What was read of one loop.
-
-    Attributes:
-        record: name of its records.
-        named: whether a user said which column is what.
-        shared: whether other loops stand in the same rows.
-    """
+    """What was read of one loop."""
 
     name: str
-    record: str
+    record: str  # name of its records
     blocks: tuple[Block, ...]
-    named: bool = False
-    shared: bool = False
+    named: bool = False  # whether a user said which column is what
+    shared: bool = False  # whether other loops stand in the same rows
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -59,34 +43,30 @@ class Found:
 
 
 def loop_of(found: Found, options: IntakeOptions) -> Loop:
-    """Return a loop with its records.
-
-    Raises:
-        InputError: it cannot be made into records, and why.
-    """
+    """Return a loop with its records; InputError when it cannot be made into records, and why."""
     _refuse_incomplete(found)
-    rules = Rules(options.strict)
+    rules = repairs.Rules(options.strict)
     for note, block in {note: one for one in found.blocks for note in one.mended}.items():
         with foreign(block.path):
             rules.tell(note, note)
-    timed = put_right(each(found.blocks, rules, with_times), rules)
-    timed = each(timed, rules, partial(with_values, shared=found.shared))
+    timed = put_right(repairs.each(found.blocks, rules, repairs.with_times), rules)
+    timed = repairs.each(timed, rules, partial(repairs.with_values, shared=found.shared))
     if len(timed) > 1:
-        timed = each(timed, rules, sorted_rows)
-    block, differing = joined(each(timed, rules, checked))
+        timed = repairs.each(timed, rules, repairs.sorted_rows)
+    block, differing = joined(repairs.each(timed, rules, repairs.checked))
     for name, count in differing.items():
         said = f"{name}: {plural(count, 'value')} at a stamp that another table has differ"
         rules.tell(f"{said}: the later table counts", said, "leave one of them out")
     notes = [*dict.fromkeys(note for one in found.blocks for note in one.notes), *rules.told]
     rules.told.clear()
-    block = without_outliers(block, rules)
+    block = repairs.without_outliers(block, rules)
     refuse_twice(block)
     block, unit, note = in_percent(block, options.op_unit, named=found.named)
     rules.told.extend([note] if note else [])
     if not found.named:
         refuse_swapped(block)
     parts: list[Record] = []
-    for run in in_order(block, rules):
+    for run in repairs.in_order(block, rules):
         parts += _records(manual_marked(run, rules, options.automatic), found, options, rules)
     notes = list(dict.fromkeys((*notes, *rules.told)))
     whole = tuple(dataclasses.replace(part, notes=(*notes, *part.notes)) for part in parts)
@@ -120,13 +100,15 @@ def _refuse_incomplete(found: Found) -> None:
         )
 
 
-def _records(run: Block, found: Found, options: IntakeOptions, rules: Rules) -> tuple[Record, ...]:
+def _records(
+    run: Block, found: Found, options: IntakeOptions, rules: repairs.Rules
+) -> tuple[Record, ...]:
     source = Source(found.record, str(run.path), run.place)
     told, wanted = len(rules.told), options.sample_time
     own = at_pv(run, rules) if is_reported(run) else run
     if own is not None:
         try:
-            kept = _whole(filled(own, rules)).records(source)
+            kept = _whole(repairs.filled(own, rules)).records(source)
             if wanted is None or all(abs(r.sample_time / wanted - 1.0) <= ALIKE for r in kept):
                 return kept
         except InputError:
@@ -138,7 +120,7 @@ def _records(run: Block, found: Found, options: IntakeOptions, rules: Rules) -> 
     stretches = on_grid(run, wanted, rules)
     for stretch in stretches:
         source = Source(found.record, str(run.path), stretch.place)
-        parts += _whole(filled(stretch, rules)).records(source)
+        parts += _whole(repairs.filled(stretch, rules)).records(source)
     if len(stretches) > 1:
         rules.told.append(f"cut at {len(stretches) - 1} gaps without a report")
     return tuple(parts)

@@ -1,7 +1,6 @@
 """The clocks of a loop's blocks put right: midnights, 12 hours, summer time.
 
-This is done in each block before blocks are joined, as afterwards the two passes over the hour
-that summer time ends with are one.
+Each block by itself, as in joined ones the two passes over an hour are one.
 """
 
 from __future__ import annotations
@@ -50,10 +49,7 @@ def _turned(block: Block, rules: Rules) -> Block:
 
 
 def _with_days(block: Block, _: Rules) -> Block:
-    """Return times of the day alone with midnights counted.
-
-    Hours are refused that are 1 to 12 alone where time falls at one, or leaps a day at midnight.
-    """
+    """Return times of the day alone with midnights counted."""
     if block.clock.zoned or not (block.clock.dated or block.clock.daily):
         return block
     wall = block.clock.start + block.time
@@ -98,11 +94,7 @@ class _Rows:
         return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
 
     def seams(self, change: Change) -> NDArray[np.intp]:
-        """Return the rows before which a clock is set by a change, as far as times tell.
-
-        Both ends of a fall lie within what is passed twice, those of a leap do not lie within
-        what is left out, and it is nearer to the whole change than to nothing.
-        """
+        """Return the rows before which a change sets the clock, by more than half of it."""
         steps, (low, high) = np.diff(self.wall), change[:2]
         first, then = self.wall[:-1], self.wall[1:]
         if change.back:
@@ -126,10 +118,7 @@ class _Rows:
 
 
 def _in_one_time(blocks: Sequence[Block], zone: str, rules: Rules) -> list[Block]:
-    """Return dated blocks of one local time with what follows each change of their clock moved.
-
-    Where its ``zone`` is not known, and empty, a change counts that rows show.
-    """
+    """Return dated blocks of one local time with what follows each change of their clock moved."""
     rows = [_Rows.of(block) for block in blocks]
     known = changes(zone, np.concatenate([one.wall // DAY for one in rows]))
     if not zone:
@@ -192,11 +181,7 @@ def _falls_by(rows: _Rows, known: Sequence[Change]) -> bool:
 
 
 def _after(block: Block, told: Sequence[_Rows | None], change: Change) -> FlagArray:
-    """Return the rows of a block that follow a change.
-
-    The rows ``told``, its own and those of its whole file, may tell which pass they belong to;
-    where they do not they are refused.
-    """
+    """Return the rows of a block that follow a change."""
     wall, (low, high) = block.clock.start + block.time, change[:2]
     if not change.back:
         return wall >= high

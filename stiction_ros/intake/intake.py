@@ -23,11 +23,8 @@ from stiction_ros.records.record import Record
 from stiction_ros.records.run.bag_reader import read_bag_loops, read_bag_parts
 from stiction_ros.records.storage.files import listed_names, split_number
 
-BARE = (".mcap", ".db3")
-"""Ends of the names of files that are bags by themselves."""
-
-OTHERS = 8
-"""Names that an error or a remark lists."""
+BARE = (".mcap", ".db3")  # ends of the names of files that are bags by themselves
+OTHERS = 8  # names that an error or a remark lists
 
 
 def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:
@@ -92,22 +89,13 @@ def _loops(files: Iterable[Path], options: IntakeOptions, tags: TagList | None) 
 
 
 def strange_files(paths: Sequence[Path], options: IntakeOptions) -> list[str]:
-    """Return the files that the tag list names and that are none of those below ``paths``.
-
-    Raises:
-        InputError: the tag list cannot be read.
-    """
+    """Return the files that the tag list names and that are none of those below ``paths``."""
     tags = None if options.tags is None else read_tag_list(options.tags)
     return [] if tags is None else tags.strange(list(_files(paths, options)))
 
 
 def one_loop(path: Path, options: IntakeOptions, name: str | None = None) -> Loop:
-    """Return the one loop of a file or a bag.
-
-    Args:
-        path: of the file; a folder that is no bag counts as its files.
-        options: how to read it.
-        name: of the loop, for files that hold several.
+    """Return the one loop of a file, a bag or a folder of files, or the one of that ``name``.
 
     Raises:
         InputError: the loop cannot be read, there is none, or there are several.
@@ -161,11 +149,7 @@ class _Table:
 
 
 def _files(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Path]:
-    """Yield the files of loops; folders give those with a known suffix, the tag list none.
-
-    A bag is one of them, and what stands beside its files is another. What is reached by several
-    ways, such as links, comes once.
-    """
+    """Yield the files of loops; folders give those with a known suffix, the tag list none."""
     seen = set() if options.tags is None else {os.path.realpath(options.tags)}
     waiting = list(reversed(paths))
     while waiting:

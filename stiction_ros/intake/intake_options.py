@@ -24,12 +24,10 @@ class OpUnit(enum.StrEnum):
     VOLT_10 = "0-10v"
     VOLT_1_5 = "1-5v"
     VOLT_2_10 = "2-10v"
-    OTHER = "other"
-    """Anything else; OP is taken as it is."""
+    OTHER = "other"  # anything else; OP is taken as it is
 
 
-LETTERS = {"op": "V", "pv": "PV", "sp": "PV", "stem": "V"}
-"""Signal to what the tags of its valves or outputs begin with, where none are given."""
+LETTERS = {"op": "V", "pv": "PV", "sp": "PV", "stem": "V"}  # first letters of tags, if none
 
 TO_PERCENT = {
     OpUnit(unit): (100.0 / (high - low), -100.0 * low / (high - low))
@@ -43,8 +41,7 @@ _OP_UNITS = {word: OpUnit(unit) for word, unit in by_word("op_units").items()}
 class TimeUnit(enum.StrEnum):
     """What a time that is a number is counted in."""
 
-    DAYS = "days"
-    """Since the last day of 1899, as spreadsheets count, when they are that many."""
+    DAYS = "days"  # since the last day of 1899, as spreadsheets count, when they are that many
     HOURS = "h"
     MINUTES = "min"
     SECONDS = "s"
@@ -97,32 +94,19 @@ class CsvColumns:
 
 @dataclasses.dataclass(frozen=True)
 class IntakeOptions:
-    """How exports are to be read.
+    """How exports are to be read."""
 
-    Attributes:
-        columns: which column is what, for files of one loop.
-        namespace: of the loop's topics, for bags that hold several loops.
-        tags: file that lists which tags make up which loop; None finds them by their names.
-        strict: whether anything that had to be repaired is a problem.
-        op_unit: of every OP; None takes it from the export.
-        time_unit: of times that are numbers; None takes it from the export.
-        dates: which comes first in dates; None finds out.
-        sample_time: s, of signals that were reported when they changed, and of rows without a
-            time; None finds it.
-        long: columns of tag, time and value of tables with one value a row; None finds them.
-        automatic: what MODE shows in automatic; None knows the usual words.
-    """
-
-    columns: CsvColumns = CsvColumns()
-    namespace: str | None = None
-    tags: Path | None = None
-    strict: bool = False
-    op_unit: OpUnit | None = None
-    time_unit: TimeUnit | None = None
-    dates: DateOrder | None = None
+    columns: CsvColumns = CsvColumns()  # which column is what, for files of one loop
+    namespace: str | None = None  # of the loop's topics, for bags that hold several loops
+    tags: Path | None = None  # file of the tags of each loop; None finds them by their names
+    strict: bool = False  # whether anything that had to be repaired is a problem
+    op_unit: OpUnit | None = None  # of every OP; None takes it from the export
+    time_unit: TimeUnit | None = None  # of times that are numbers; None takes it from the export
+    dates: DateOrder | None = None  # which comes first in dates; None finds out
+    # s, of signals that were reported when they changed, and of rows without a time; None finds it
     sample_time: float | None = None
-    long: tuple[str, ...] | None = None
-    automatic: tuple[str, ...] | None = None
+    long: tuple[str, ...] | None = None  # columns of tag, time, value, one value a row; None finds
+    automatic: tuple[str, ...] | None = None  # what MODE shows in automatic; None: the usual words
 
 
 def known_op_unit(word: str) -> OpUnit | None:

@@ -13,32 +13,21 @@ from stiction_ros.records.record import Record
 
 @dataclasses.dataclass(frozen=True)
 class Loop:
-    """A named loop with its records, or the reason why there are none.
+    """A named loop with its records, or the reason why there are none."""
 
-    Attributes:
-        name: of the loop: its tag, or the name of its file.
-        files: that it was read from.
-        parts: its records, one for each stretch without a gap, in their order; a sample's
-            quality says what was held, bad or in manual. Empty when there is a problem.
-        notes: what was masked, held, cut, converted, with its count, one sentence each; the
-            records bear the same.
-        problem: why it cannot be read and what helps, one sentence; None when it can be.
-        columns: signal to the column or tag that it was read from.
-        op_unit: what OP is in; OP of a share or a current has been brought to %.
-        spreads: signal to the least, median and largest number of its column, in the column's own
-            unit; of bags OP in %.
-        modes: words of the mode, each with its count and what it is taken for.
-    """
-
-    name: str
-    files: tuple[Path, ...]
+    name: str  # of the loop: its tag, or the name of its file
+    files: tuple[Path, ...]  # that it was read from
+    # its records, one for each stretch without a gap, in their order; a sample's quality says what
+    # was held, bad or in manual. Empty when there is a problem
     parts: tuple[Record, ...]
-    notes: tuple[str, ...] = ()
-    problem: str | None = None
-    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    op_unit: str = "%"
+    notes: tuple[str, ...] = ()  # what was masked, held, cut, converted; the records bear the same
+    problem: str | None = None  # why it cannot be read and what helps; None when it can be
+    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)  # of each signal, or tag
+    op_unit: str = "%"  # what OP is in; OP of a share or a current has been brought to %
+    # signal to the least, median and largest number of its column, in the column's own unit; of
+    # bags OP in %
     spreads: Mapping[str, Spread] = dataclasses.field(default_factory=dict)
-    modes: tuple[str, ...] = ()
+    modes: tuple[str, ...] = ()  # words of the mode, each with its count and what it is taken for
 
     @property
     def summary(self) -> str:

@@ -22,18 +22,14 @@ from stiction_ros.texts import plural
 AUTOMATIC, MANUAL = pattern_of("automatic"), pattern_of("manual")
 """Words of modes; in tracking and initialisation OP follows something else than the controller."""
 
-STILL = 0.02
-"""Share of samples at which OP moves at most in manual, to tell modes that are numbers."""
-
-BUSY = 0.2
-"""Share of samples at which OP moves at least in automatic, for the same."""
+STILL = 0.02  # share of samples at which OP moves at most in manual, to tell modes that are numbers
+BUSY = 0.2  # share of samples at which OP moves at least in automatic, for the same
 
 
 def manual_marked(block: Block, rules: Rules, automatic: tuple[str, ...] | None) -> Block:
     """Return the block with samples in manual or tracking marked so, and without its mode.
 
     An empty mode goes on as before. Numbers are told apart by OP, which stands still in manual.
-
     What is shown in ``automatic`` may be said; None knows the usual words.
 
     Raises:

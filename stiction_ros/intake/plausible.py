@@ -17,20 +17,11 @@ from stiction_ros.intake.tables.block import Block, Column
 from stiction_ros.intake.words import WORDS
 from stiction_ros.signals.velocity_form import explained
 
-PERCENT = (-10.0, 110.0)
-"""What an OP in % stays within."""
-
-OFTEN = 0.1
-"""Share of the samples outside of that from which it is told."""
-
-CURRENT = (3.8, 20.5)
-"""What an OP in mA stays within."""
-
-FOLLOWS = 0.9
-"""Share of the moves of a controller's output that its law explains, at least."""
-
-LEADS = 8.0
-"""How many times more the law leaves unexplained the other way round, at least."""
+PERCENT = (-10.0, 110.0)  # what an OP in % stays within
+OFTEN = 0.1  # share of the samples outside of that from which it is told
+CURRENT = (3.8, 20.5)  # what an OP in mA stays within
+FOLLOWS = 0.9  # share of the moves of a controller's output that its law explains, at least
+LEADS = 8.0  # how many times more the law leaves unexplained the other way round, at least
 
 STRIDES = (1, 2, 4, 8)
 """Samples over which moves are looked at; one of them is enough.
@@ -40,20 +31,11 @@ while the move grows. Of the field's loops 1 in 160 is called swapped as it is, 
 that are.
 """
 
-SAID = {unit: WORDS["op_ranges"][unit][2] for unit in TO_PERCENT}
-"""Units of an OP as notes name them."""
-
-SEVERAL = frozenset(WORDS["several"])
-"""Units of OP of which several ranges are usual."""
-
-OWN = "its own unit"
-"""What stands for the unit of an OP that is not known to be in %."""
-
-EXAMINED = 20_000
-"""Samples that are looked at."""
-
-FEWEST = 50
-"""Samples from which anything is told of a swap."""
+SAID = {unit: WORDS["op_ranges"][unit][2] for unit in TO_PERCENT}  # units as notes say
+SEVERAL = frozenset(WORDS["several"])  # units of OP of which several ranges are usual
+OWN = "its own unit"  # what stands for the unit of an OP that is not known to be in %
+EXAMINED = 20_000  # samples that are looked at
+FEWEST = 50  # samples from which anything is told of a swap
 
 CLOSER, OFFSET, TRACKED = 0.1, 0.3, 0.7
 """How much nearer to the set-point than the other the measurement is, as a share; its lasting
@@ -65,10 +47,8 @@ def in_percent(
 ) -> tuple[Block, str, str]:
     """Return the block with OP and stem in %, the unit, and a note on what was done.
 
-    Args:
-        block: as read.
-        given: unit that a user or a tag list says; None takes the export's word.
-        named: whether a user said which column is what.
+    A user or a tag list may have ``given`` the unit; whether a user ``named`` the columns matters
+    to the advice.
 
     Raises:
         InputError: OP lies between 0 and 1 and nothing says what it is, or far outside of the unit
@@ -127,10 +107,7 @@ def _without_unit(block: Block, ops: Sequence[Column], *, named: bool) -> tuple[
 
 
 def _fits(block: Block, unit: OpUnit, *, given: bool, named: bool) -> str:
-    """Return a note where OP often lies below its unit, as one without its mean does.
-
-    Where the median, or many samples, lie outside of the unit it is refused.
-    """
+    """Return a note where OP often lies below its unit, as one without its mean does."""
     factor, offset = TO_PERCENT[unit]
     note = ""
     said = f"though {'OP is said to be in' if given else 'the export says'} {SAID[unit]}"
@@ -178,16 +155,13 @@ def refuse_twice(block: Block) -> None:
 
 
 def refuse_swapped(block: Block) -> None:
-    """Raise when PV and OP look swapped.
+    """Raise an :class:`InputError` when PV and OP look swapped.
 
     Where a set-point is recorded, the measurement is what stays near it. Else:
     In closed loop a controller's output moves by K (Δe + T_s/T_i e): its Δ is explained by the
     measurement and its Δ at the same sample, and not the other way round. What rounding and
     compression hide of that shows over some samples, see :data:`STRIDES`. Of exact controllers
     :mod:`stiction_ros.identification.problem.input_checks` knows more.
-
-    Raises:
-        InputError: OP and PV look swapped.
     """
     op, pv, sp = (_only(block, signal) for signal in ("op", "pv", "sp"))
     if op is None or pv is None:
@@ -203,11 +177,7 @@ def refuse_swapped(block: Block) -> None:
 
 
 def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
-    """Return whether ``one`` is :data:`CLOSER` to the set-point, and it alone without an offset.
-
-    Where neither has a lasting offset, as in signals without their means, the unit alone may make
-    the one smaller.
-    """
+    """Return whether ``one`` is :data:`CLOSER` to the set-point, and it alone without an offset."""
     there = np.isfinite(sp) & np.isfinite(one) & np.isfinite(other)
     if np.count_nonzero(there) < FEWEST:
         return False
@@ -220,10 +190,7 @@ def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
 
 
 def _swapped(block: Block, reason: str, otherwise: Sequence[str] = ()) -> InputError:
-    """Return the error of a block whose one OP and one PV look swapped.
-
-    What is to be said ``otherwise``, if they are not, is advised with their names.
-    """
+    """Return the error of a block whose one OP and one PV look swapped."""
     tag, name = {}, {}
     for key, column in block.columns.items():
         tag[key.signal], name[key.signal] = key.tag, column.name

@@ -21,14 +21,7 @@ NO_RECORD = (
 
 
 def record_of(given: Record | str | os.PathLike[str]) -> Record:
-    """Return a record, read from a file where its path is given.
-
-    Args:
-        given: by a user, of any type.
-
-    Raises:
-        InputError: it is neither a record nor a path, or the file cannot be read.
-    """
+    """Return a record, read from a file where its path is given; InputError for anything else."""
     if isinstance(given, Record):
         return given
     if isinstance(given, str | os.PathLike):

@@ -1,9 +1,6 @@
 """What is wrong with the rows of a loop: told, counted, and masked, held or cut by one rule.
 
-Rows without a time are left out, single rows out of order sorted; of rows with one stamp the last
-counts. What is no number, of bad quality, or far outside everything else (a sentinel such as −9999)
-is missing: up to :data:`HELD` samples in a row are held (OP, SP) or interpolated (PV), more are
-bad. Missing set-points are held however long.
+What is missing is held (OP, SP) or interpolated (PV) for up to :data:`HELD` samples, else bad.
 """
 
 from __future__ import annotations
@@ -24,26 +21,16 @@ from stiction_ros.records.regular import spread_evenly
 from stiction_ros.signals.holds import stretches
 from stiction_ros.texts import plural
 
-HELD = 5
-"""Samples in a row that are held at most; a gap in time is one from 5.5 samples on."""
-
-FAR = 5.0
-"""How many times the range of all other values a value is away that cannot belong to them."""
-
-SENTINEL_FAR = 0.5
-"""The same for numbers that stand for bad values."""
+HELD = 5  # samples in a row that are held at most; a gap in time is one from 5.5 samples on
+FAR = 5.0  # how many times the range of all other values a value is away that cannot belong to them
+SENTINEL_FAR = 0.5  # the same for numbers that stand for bad values
 
 SENTINELS: tuple[float, ...] = tuple(WORDS["sentinels"])
 """Numbers that loggers and controllers write in the place of a bad value."""
 
-FEWEST_USUAL = 10
-"""Values from which on it can be told that another one does not belong to them."""
-
-RARE = 0.2
-"""Share of a signal that may lie far outside."""
-
-FEW = 0.01
-"""Share of stamps that may be left out as not understood."""
+FEWEST_USUAL = 10  # values from which on it can be told that another one does not belong to them
+RARE = 0.2  # share of a signal that may lie far outside
+FEW = 0.01  # share of stamps that may be left out as not understood
 
 FORMS = (
     "write times as 2024-10-17 21:55:00, 17.10.2024 21:55, 10/17/2024 9:55 PM, 17 Oct 2024 21:55 "
@@ -81,11 +68,7 @@ def each(
 
 
 def with_times(block: Block, rules: Rules) -> Block:
-    """Return the rows that have a time.
-
-    Raises:
-        InputError: none has one, or more than :data:`FEW` have one that is not understood.
-    """
+    """Return the rows that have a time; InputError if none, or more than ``FEW`` are strange."""
     there, strange = np.isfinite(block.time), int(np.count_nonzero(np.isinf(block.time)))
     lost = len(there) - int(np.count_nonzero(there))
     if not lost:

@@ -1,9 +1,6 @@
 """Signals that were reported when they changed, brought onto a regular grid.
 
-OP, SP and modes hold until the next report; PV goes straight from report to report, as in
-records with missing rows. What is not known between two reports is lost, which is said. Tags
-asked regularly, each on its own clock, are reports only in their stamps: PV keeps its values, and
-OP holds, as a line through the stairs of OP gives another friction.
+OP, SP and modes hold until the next report; PV goes straight from report to report.
 """
 
 from __future__ import annotations
@@ -22,17 +19,10 @@ from stiction_ros.records.quality import Quality, QualityArray
 from stiction_ros.records.regular import GAP
 from stiction_ros.texts import plural
 
-COVERED = 0.75
-"""Share of all stamps that OP and PV each have, from which they were sampled together."""
-
-ON_GRID = 0.9
-"""Share of the steps that are multiples of the smallest, from which there is a scan."""
-
-DENSEST = 10.0
-"""Samples for one report of the signal that is reported most, at most."""
-
-QUIET = 60
-"""Samples that a signal may stay without a report before it counts as a gap."""
+COVERED = 0.75  # share of all stamps that OP and PV each have if they were sampled together
+ON_GRID = 0.9  # share of the steps that are multiples of the smallest, from which there is a scan
+DENSEST = 10.0  # samples for one report of the signal that is reported most, at most
+QUIET = 60  # samples that a signal may stay without a report before it counts as a gap
 
 
 def is_reported(block: Block) -> bool:
@@ -48,8 +38,7 @@ def at_pv(block: Block, rules: Rules) -> Block | None:
     """Return the rows of PV with what every other signal was last, or None.
 
     So nothing measured is moved where each tag is asked as often as the other on a clock of its
-    own: PV has no value but its own, and OP is what the valve had been given. It is None where
-    there are several PV, or PV has fewer stamps than another signal.
+    own. It is None where there are several PV, or PV has fewer stamps than another signal.
     """
     stamps, outputs = _reports(block), list(block.of("pv"))
     if len(outputs) != 1 or len(stamps[outputs[0]]) < COVERED * max(map(len, stamps.values())):
@@ -83,13 +72,7 @@ def at_pv(block: Block, rules: Rules) -> Block | None:
 def on_grid(block: Block, sample_time: float | None, rules: Rules) -> list[Block]:
     """Return a block with regular stamps for each stretch without a gap.
 
-    Args:
-        block: signals at increasing stamps, blank where nothing was reported.
-        sample_time: s; None takes the scan that the stamps show.
-        rules: get the note.
-
-    Raises:
-        InputError: a signal has fewer than two reports, or strict.
+    Signals are blank where nothing was reported. A sample time of None is the stamps' scan, s.
     """
     stamps = _reports(block)
     needed = {key: stamps[key] for key in block.of("op", "pv")}

@@ -14,8 +14,7 @@ from stiction_ros.intake.tables.clock import SPREADSHEET
 from stiction_ros.intake.words import WORDS
 from stiction_ros.texts import DAY
 
-YEARS = SPREADSHEET[1] - SPREADSHEET[0]
-"""Days from 1970 to 2099."""
+YEARS = SPREADSHEET[1] - SPREADSHEET[0]  # days from 1970 to 2099
 
 
 class Change(NamedTuple):

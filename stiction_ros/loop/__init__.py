@@ -2,15 +2,13 @@
 
 from stiction_ros.loop.closed_loop import (
     ClosedLoopRun,
-    Controller,
     PiController,
     PiControllers,
-    own_controller,
     simulate,
     simulate_closed_loop,
 )
 from stiction_ros.loop.excitation import prbs_experiment, random_binary, simulate_open_loop
-from stiction_ros.loop.model import Disturbance, LoopModel, PiTuning, Valve
+from stiction_ros.loop.model import LoopModel, PiTuning
 from stiction_ros.loop.plant import Measurement, Plant
 from stiction_ros.loop.set_points import SetPoints
 from stiction_ros.loop.valve_changes import ValveChange, read_valve_changes
@@ -18,8 +16,6 @@ from stiction_ros.loop.yaml_process import Instrument
 
 __all__ = [
     "ClosedLoopRun",
-    "Controller",
-    "Disturbance",
     "Instrument",
     "LoopModel",
     "Measurement",
@@ -28,9 +24,7 @@ __all__ = [
     "PiTuning",
     "Plant",
     "SetPoints",
-    "Valve",
     "ValveChange",
-    "own_controller",
     "prbs_experiment",
     "random_binary",
     "read_valve_changes",

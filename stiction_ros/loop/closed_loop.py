@@ -28,15 +28,10 @@ class Controller(Protocol):
 
 @dataclasses.dataclass(frozen=True)
 class ClosedLoopRun:
-    """Signals of a simulated loop.
+    """Signals of a simulated loop."""
 
-    Attributes:
-        record: op, pv, sp and the true stem positions.
-        pv_clean: outputs without noise, shape (N, p).
-    """
-
-    record: Record
-    pv_clean: FloatArray = dataclasses.field(repr=False)
+    record: Record  # op, pv, sp and the true stem positions
+    pv_clean: FloatArray = dataclasses.field(repr=False)  # outputs without noise, shape (N, p)
 
 
 def simulate_closed_loop(
@@ -137,9 +132,6 @@ class PiControllers:
 
 def own_controller(model: LoopModel) -> PiController:
     """Return the controller that ``model`` records, at rest at the loop's starting point.
-
-    Args:
-        model: a loop of one valve and one output with ``controller: {kind: pi, …}``.
 
     Raises:
         InputError: the loop records no controller, or has more valves or outputs than a PI

@@ -12,15 +12,10 @@ from stiction_ros.loop.linear_loops import Process
 
 @dataclasses.dataclass(frozen=True)
 class Ringing:
-    """One oscillation of a linear loop.
+    """One oscillation of a linear loop."""
 
-    Attributes:
-        period: samples.
-        growth: share of an oscillation that is left after one period; 1 and more is sustained.
-    """
-
-    period: float
-    growth: float
+    period: float  # samples
+    growth: float  # share of an oscillation that is left after one period; 1 and more is sustained
 
 
 def ringing(

@@ -23,18 +23,8 @@ def random_binary(
 ) -> FloatArray:
     """Return independent random binary sequences, shape (samples, valves), %.
 
-    Each valve starts at either level with equal chance and changes to the other one with
+    Each valve starts at either of two ``levels`` with equal chance and changes to the other with
     ``switch_probability`` at every further sample, as in Appendix A.
-
-    Args:
-        random: source of chance.
-        samples: N ≥ 1.
-        valves: m ≥ 1.
-        switch_probability: between 0 and 1, neither included.
-        levels: low and high, %.
-
-    Raises:
-        InputError: a value out of range.
     """
     if samples < 1 or valves < 1:
         raise InputError(f"{samples} samples of {valves} valves", where="samples", fix="use 1 up")
@@ -53,16 +43,7 @@ def random_binary(
 
 
 def simulate_open_loop(model: LoopModel, op: FloatArray, seed: int) -> ClosedLoopRun:
-    """Return the run of the plant of ``model`` under given controller outputs, without set-points.
-
-    Args:
-        model: plant and starting point.
-        op: controller outputs, shape (N, m), %.
-        seed: of the plant's noise.
-
-    Raises:
-        InputError: OP of another shape or not finite.
-    """
+    """Return the run of the plant of ``model`` under given OP, (N, m), %, without set-points."""
     op = np.asarray(op, dtype=float)
     if op.ndim != 2 or op.shape[1] != len(model.valves):
         raise InputError(f"op has shape {op.shape}, not (N, {len(model.valves)})", where=model.name)

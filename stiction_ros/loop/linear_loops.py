@@ -1,7 +1,6 @@
 """Loops of controllers, sticky valves and a linear process, many at once, compiled.
 
-Per sample and run: every PV by equation (9), every OP by the velocity form of its controller, every
-stem by the law of its valve. A valve without a controller keeps its OP.
+A valve without a controller keeps its OP.
 """
 
 from __future__ import annotations
@@ -19,43 +18,26 @@ from stiction_ros.signals.recovered_controller import RecoveredController
 Pairs = Sequence[tuple[int, RecoveredController]]
 """Per valve the output of its controller, −1 for none, and the controller."""
 
-BEYOND = 1e6
-"""Times the size of a start from which on a run is taken as gone."""
-
-LANES = 8
-"""Runs that go side by side: as many as a vector of the processor or two hold."""
+BEYOND = 1e6  # times the size of a start from which on a run is taken as gone
+LANES = 8  # runs that go side by side: as many as a vector of the processor or two hold
 
 
 class Process(NamedTuple):
-    """Equation (9) of p outputs and m valves.
+    """Equation (9) of p outputs and m valves."""
 
-    Attributes:
-        a: a_1 … a_na, zeros behind, shape (p, na).
-        b: b_1 … b_nb, zeros behind, shape (p, m, nb).
-        delay: t_d, shape (p, m).
-        bias: shape (p,).
-    """
-
-    a: FloatArray
-    b: FloatArray
-    delay: IntArray
-    bias: FloatArray
+    a: FloatArray  # a_1 … a_na, zeros behind, shape (p, na)
+    b: FloatArray  # b_1 … b_nb, zeros behind, shape (p, m, nb)
+    delay: IntArray  # t_d, shape (p, m)
+    bias: FloatArray  # shape (p,)
 
 
 class Controllers(NamedTuple):
-    """One controller per valve; what is the same in all runs.
+    """One controller per valve; what is the same in all runs."""
 
-    Attributes:
-        output: index of the output that it reads, −1 for none, shape (m,).
-        lag: samples between PV and OP, shape (m,).
-        smoothing: share of the last value in the filter of e, shape (m,).
-        low, high: limits of OP, shape (m,).
-    """
-
-    output: IntArray
-    lag: IntArray
-    smoothing: FloatArray
-    low: FloatArray
+    output: IntArray  # index of the output that it reads, −1 for none, shape (m,)
+    lag: IntArray  # samples between PV and OP, shape (m,)
+    smoothing: FloatArray  # share of the last value in the filter of e, shape (m,)
+    low: FloatArray  # low, high: limits of OP, shape (m,)
     high: FloatArray
 
     @classmethod
@@ -68,23 +50,15 @@ class Controllers(NamedTuple):
 
 
 class Runs(NamedTuple):
-    """What differs from run to run, R runs.
+    """What differs from run to run, R runs."""
 
-    Attributes:
-        friction: (f_S, f_D), shape (R, m, 2).
-        tuning: (K, K_i, K_d), shape (R, m, 3).
-        pv: before the first sample, oldest first, shape (R, H, p).
-        stem: before the first sample, oldest first, shape (R, H, m).
-        op: the last one before the first sample, shape (R, m).
-        laws: per valve, whether Kano's or Choudhury's rules move its stem in place of He's law (4),
-            and by which factor a slip is longer than He's, shape (m, 3).
-    """
-
-    friction: FloatArray
-    tuning: FloatArray
-    pv: FloatArray
-    stem: FloatArray
-    op: FloatArray
+    friction: FloatArray  # (f_S, f_D), shape (R, m, 2)
+    tuning: FloatArray  # (K, K_i, K_d), shape (R, m, 3)
+    pv: FloatArray  # before the first sample, oldest first, shape (R, H, p)
+    stem: FloatArray  # before the first sample, oldest first, shape (R, H, m)
+    op: FloatArray  # the last one before the first sample, shape (R, m)
+    # per valve, whether Kano's or Choudhury's rules move its stem in place of He's law (4), and by
+    # which factor a slip is longer than He's, shape (m, 3)
     laws: FloatArray
 
 
@@ -127,10 +101,7 @@ def command(
 
 @compiled
 def _in_lanes(values: FloatArray, first: int, by_lane: FloatArray) -> None:
-    """Copy runs from ``first`` on, shape (R, n, q), side by side, shape (n, q, LANES).
-
-    Where there are fewer, the last one is repeated.
-    """
+    """Copy runs from ``first`` on, shape (R, n, q), side by side, shape (n, q, LANES)."""
     for lane in range(LANES):
         run = min(first + lane, len(values) - 1)
         for k in range(values.shape[1]):
@@ -140,11 +111,7 @@ def _in_lanes(values: FloatArray, first: int, by_lane: FloatArray) -> None:
 
 @compiled
 def run_loops(
-    process: Process,
-    controllers: Controllers,
-    runs: Runs,
-    sp: FloatArray,
-    load: FloatArray,
+    process: Process, controllers: Controllers, runs: Runs, sp: FloatArray, load: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return OP, shape (R, n, m), and PV, shape (R, n, p).
 

@@ -14,8 +14,7 @@ import yaml
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.effects import from_mapping as effect_from_mapping
 from stiction_ros.errors import InputError, foreign
-from stiction_ros.loop.places import append_effect
-from stiction_ros.loop.yaml_effects import at_place, read_effects
+from stiction_ros.loop.places import append_effect, at_place, read_effects
 from stiction_ros.loop.yaml_process import Instrument, read_instruments, read_process
 from stiction_ros.loop.yaml_reading import Section, load_yaml, parse_yaml
 from stiction_ros.processes import Process
@@ -32,17 +31,11 @@ class Valve:
 
 @dataclasses.dataclass(frozen=True)
 class Disturbance:
-    """An unmeasured effect that adds to an output, a further input, or the stem of a valve.
+    """An unmeasured effect that adds to an output, a further input, or the stem of a valve."""
 
-    Attributes:
-        place: tag of the output, the input or the valve.
-        behaviour: what is added.
-        load: whether it enters the process beside the stem of a valve.
-    """
-
-    place: str
-    behaviour: Behaviour
-    load: bool = False
+    place: str  # tag of the output, the input or the valve
+    behaviour: Behaviour  # what is added
+    load: bool = False  # whether it enters the process beside the stem of a valve
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from stiction_ros.effects import Behaviour
+from stiction_ros.effects import from_mapping as effect_from_mapping
 from stiction_ros.errors import InputError
+from stiction_ros.loop.yaml_reading import Section
 from stiction_ros.processes import Process
 
 KINDS = ("valve", "load", "process", "sensor", "disturbance")
@@ -14,17 +16,10 @@ KINDS = ("valve", "load", "process", "sensor", "disturbance")
 def append_effect(
     document: dict[str, Any], place: str, effect: Behaviour, process: Process
 ) -> None:
-    """Add ``effect`` at ``place`` to the YAML mapping ``document``, in place.
+    """Add ``effect`` at ``place`` to the YAML mapping ``document`` of a loop model.
 
-    Args:
-        document: of a loop model.
-        place: ``valve:TAG``, ``load:TAG``, ``process:TAG``, ``sensor:TAG`` or
-            ``disturbance:TAG``.
-        effect: what acts there.
-        process: of the same loop, for its tags.
-
-    Raises:
-        InputError: no such place.
+    The place is ``valve:TAG``, ``load:TAG``, ``process:TAG``, ``sensor:TAG`` or ``disturbance:TAG``
+    of the ``process``; InputError for any other.
     """
     kind, _, tag = place.partition(":")
     if kind not in KINDS:
@@ -57,3 +52,25 @@ def _entry(entries: list[dict[str, Any]], tag: str) -> dict[str, Any]:
             return entry
     entries.append({"name": tag})
     return entries[-1]
+
+
+def read_effects(section: Section, place: str) -> tuple[Behaviour, ...]:
+    """Return the behaviours of the key ``effects``, none if it is absent; errors name the entry."""
+    effects = []
+    for entry in section.sections("effects", []):
+        try:
+            effects.append(at_place(effect_from_mapping(entry.values), place))
+        except InputError as error:
+            raise error.within(entry.where) from None
+    return tuple(effects)
+
+
+def at_place(effect: Behaviour, place: str) -> Behaviour:
+    """Return an effect that may act at a kind of place; one that names no places acts anywhere."""
+    if effect.places and place not in effect.places:
+        raise InputError(
+            f"{effect.title()} cannot act on a {place}",
+            where="effect",
+            fix=f"it acts on: {', '.join(effect.places)}",
+        )
+    return effect

@@ -16,19 +16,12 @@ from stiction_ros.processes import NoiseEntry
 
 @dataclasses.dataclass(frozen=True)
 class Measurement:
-    """What the plant shows at one sample.
+    """What the plant shows at one sample."""
 
-    Attributes:
-        time: seconds since the first sample.
-        pv: measured outputs, shape (p,).
-        pv_clean: outputs without noise and sensor effects, shape (p,).
-        dv: measured disturbances in deviations from nominal, shape (d,).
-    """
-
-    time: float
-    pv: FloatArray
-    pv_clean: FloatArray
-    dv: FloatArray
+    time: float  # seconds since the first sample
+    pv: FloatArray  # measured outputs, shape (p,)
+    pv_clean: FloatArray  # outputs without noise and sensor effects, shape (p,)
+    dv: FloatArray  # measured disturbances in deviations from nominal, shape (d,)
 
 
 class _Chain:

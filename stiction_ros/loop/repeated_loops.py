@@ -19,30 +19,21 @@ from stiction_ros.effects.behaviour import Behaviour, FloatArray, IntArray
 from stiction_ros.loop.linear_loops import Controllers, command
 from stiction_ros.signals.controller_recovery import smoothed
 
-BEYOND = 1e4
-"""Times the size of the record from which on a run is taken as gone."""
+BEYOND = 1e4  # times the size of the record from which on a run is taken as gone
 
 Control = Callable[[int, FloatArray, FloatArray], None]
 """Sets OP of sample k, shape (R, N, m), by PV, shape (R, N, p), up to it."""
 
-Laws = Sequence[Sequence[Behaviour | None]]
-"""Law of each valve of each run; None where the stem follows OP."""
+Laws = Sequence[Sequence[Behaviour | None]]  # of each valve of each run; None: ideal
 
 
 class Equations(NamedTuple):
-    """Of each of R runs, p outputs and m valves.
+    """Of each of R runs, p outputs and m valves."""
 
-    Attributes:
-        a: a_1 … a_n, shape (R, p, n).
-        b: b_1 … b_n, shape (R, p, m, n).
-        delay: d, the same in all runs, shape (p, m).
-        outside: ε, shape (R, p, N), the constant and waves in it.
-    """
-
-    a: FloatArray
-    b: FloatArray
-    delay: IntArray
-    outside: FloatArray
+    a: FloatArray  # a_1 … a_n, shape (R, p, n)
+    b: FloatArray  # b_1 … b_n, shape (R, p, m, n)
+    delay: IntArray  # d, the same in all runs, shape (p, m)
+    outside: FloatArray  # ε, shape (R, p, N), the constant and waves in it
 
 
 class Stems:

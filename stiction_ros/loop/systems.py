@@ -14,14 +14,7 @@ WANTED = "give a system of scipy.signal or control, (num, den), or (A, B, C, D)"
 
 
 def process_of(system: Any, sample_time: float, dead_time: float) -> dict[str, Any]:
-    """Return the section ``process`` of valves V1, V2, … and outputs PV1, PV2, ….
-
-    Args:
-        system, sample_time, dead_time: as :meth:`stiction_ros.loop.model.LoopModel.from_system`.
-
-    Raises:
-        InputError: no linear system, or one that no loop model can hold.
-    """
+    """Return the section ``process`` of ``LoopModel.from_system``."""
     step = number(sample_time, "sample_time", above=0.0)
     late = number(dead_time, "dead_time", low=0.0)
     dt, given = getattr(system, "dt", None) or None, system

@@ -9,7 +9,7 @@ import yaml
 
 from stiction_ros.effects import Behaviour
 from stiction_ros.errors import InputError
-from stiction_ros.loop.yaml_effects import read_effects
+from stiction_ros.loop.places import read_effects
 from stiction_ros.loop.yaml_reading import Section, parse_yaml
 
 
@@ -18,16 +18,11 @@ class ValveChange:
     """From the first sample at or after a time on, a valve has other effects.
 
     The stem stays where it is, and the new effects begin at rest there.
-
-    Attributes:
-        time: seconds since the first sample.
-        valve: tag.
-        effects: in signal order; none for a valve that follows OP.
     """
 
-    time: float
-    valve: str
-    effects: tuple[Behaviour, ...]
+    time: float  # seconds since the first sample
+    valve: str  # tag
+    effects: tuple[Behaviour, ...]  # in signal order; none for a valve that follows OP
 
 
 def read_valve_changes(
@@ -35,14 +30,8 @@ def read_valve_changes(
 ) -> tuple[ValveChange, ...]:
     """Return the changes in the order of their times.
 
-    Args:
-        value: a list of ``{time, valve, effects}``, or the same as YAML text, as a ROS parameter
-            holds it; empty for none.
-        valves: tags of the loop.
-        where: for messages.
-
-    Raises:
-        InputError: naming the entry at fault.
+    The ``value`` is a list of ``{time, valve, effects}``, or that as YAML text, as a ROS parameter
+    holds it; empty for none. The error names the entry at fault.
     """
     if isinstance(value, str):
         value = parse_yaml(value, where) if value.strip() else []

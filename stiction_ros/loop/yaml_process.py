@@ -7,22 +7,11 @@ import math
 
 import numpy as np
 
+from stiction_ros import processes
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.loop.yaml_effects import read_effects
+from stiction_ros.loop.places import read_effects
 from stiction_ros.loop.yaml_reading import Section
-from stiction_ros.processes import (
-    AlteredProcess,
-    ArxOutput,
-    ArxProcess,
-    LinearModel,
-    Noise,
-    NoiseEntry,
-    Process,
-    StateSpaceProcess,
-    StirredTank,
-    TankParameters,
-)
 from stiction_ros.processes.sampled import equation, held
 
 _KINDS = ("arx", "state_space", "transfer_function", "stirred_tank")
@@ -30,21 +19,16 @@ _KINDS = ("arx", "state_space", "transfer_function", "stirred_tank")
 
 @dataclasses.dataclass(frozen=True)
 class Instrument:
-    """Limits of one measured output; infinite where nothing is known.
+    """Limits of one measured output; infinite where nothing is known."""
 
-    Attributes:
-        low, high: range, engineering units.
-        rate_limit: fastest credible change of the measurement, units per second.
-    """
-
-    low: float = -math.inf
+    low: float = -math.inf  # low, high: range, engineering units
     high: float = math.inf
-    rate_limit: float = math.inf
+    rate_limit: float = math.inf  # fastest credible change of the measurement, units per second
 
 
 def read_process(
     section: Section, point: Section, valves: tuple[str, ...], sample_time: float
-) -> Process:
+) -> processes.Process:
     """Build the process; ``point`` is the loop's operating point, read for linear kinds."""
     kind = section.choice("kind", _KINDS)
     if kind == "transfer_function":
@@ -58,10 +42,10 @@ def read_process(
         process = _read_tank(section, point, valves, sample_time)
     section.finish()
     effects = tuple(_read_filters(entry) for entry in section.sections("outputs", []))
-    return AlteredProcess(process, effects, sample_time) if any(effects) else process
+    return processes.AlteredProcess(process, effects, sample_time) if any(effects) else process
 
 
-def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> Process:
+def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> processes.Process:
     if "measured_disturbances" in section and section.raw("measured_disturbances"):
         raise InputError(
             "an arx process has no measured disturbances",
@@ -80,7 +64,7 @@ def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> Proc
         delays.finish()
         _read_elsewhere(entry)
         try:
-            equation = ArxOutput(
+            equation = processes.ArxOutput(
                 name,
                 tuple(entry.numbers("a").tolist()),
                 b,
@@ -96,10 +80,12 @@ def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> Proc
         raise InputError("has no output", where=section.at("outputs"))
     names = tuple(equation.name for equation in equations)
     op0, pv0 = _read_point(point, valves, names)
-    return ArxProcess(tuple(equations), valves, op0, pv0)
+    return processes.ArxProcess(tuple(equations), valves, op0, pv0)
 
 
-def _read_state_space(section: Section, point: Section, valves: tuple[str, ...]) -> Process:
+def _read_state_space(
+    section: Section, point: Section, valves: tuple[str, ...]
+) -> processes.Process:
     names, noise = _read_outputs(section, None)
     measured = _read_measured(section)
     a, b, c = section.matrix("a"), section.matrix("b"), section.matrix("c")
@@ -115,8 +101,8 @@ def _read_state_space(section: Section, point: Section, valves: tuple[str, ...])
                 b = np.pad(b, ((0, 1), (0, 0)))
                 b[:, j] = np.eye(len(b))[-1]
                 c, e = np.pad(c, ((0, 0), (0, 1))), np.pad(e, ((0, 1), (0, 0)))
-        model = LinearModel(a, b, c, e, np.zeros(len(a)), op0, pv0)
-        return StateSpaceProcess(model, valves, names, noise, measured)
+        model = processes.LinearModel(a, b, c, e, np.zeros(len(a)), op0, pv0)
+        return processes.StateSpaceProcess(model, valves, names, noise, measured)
     except InputError as error:
         raise error.within(section.where) from None
 
@@ -146,11 +132,11 @@ def _as_arx(section: Section, valves: tuple[str, ...], sample_time: float) -> Se
 
 def _read_tank(
     section: Section, point: Section, valves: tuple[str, ...], sample_time: float
-) -> Process:
+) -> processes.Process:
     names, noise = _read_outputs(section, ("C", "T"))
     measured = _read_measured(section)
     values = {}
-    for field in dataclasses.fields(TankParameters):
+    for field in dataclasses.fields(processes.TankParameters):
         if field.name in section:
             values[field.name] = section.number(field.name, above=0.0)
     if point.values:
@@ -160,16 +146,18 @@ def _read_tank(
             fix="leave operating_point out and give initial instead",
         )
     try:
-        return StirredTank(valves, names, noise, TankParameters(**values), sample_time, measured)
+        return processes.StirredTank(
+            valves, names, noise, processes.TankParameters(**values), sample_time, measured
+        )
     except InputError as error:
         raise error.within(section.where) from None
 
 
 def _read_outputs(
     section: Section, default: tuple[str, ...] | None
-) -> tuple[tuple[str, ...], tuple[Noise, ...]]:
+) -> tuple[tuple[str, ...], tuple[processes.Noise, ...]]:
     if default is not None and "outputs" not in section:
-        return default, tuple(Noise() for _ in default)
+        return default, tuple(processes.Noise() for _ in default)
     names, noise = [], []
     for entry in section.sections("outputs"):
         names.append(entry.text("name"))
@@ -236,14 +224,14 @@ def _read_measured(section: Section) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _read_noise(entry: Section) -> Noise:
+def _read_noise(entry: Section) -> processes.Noise:
     if "noise" not in entry:
-        return Noise()
+        return processes.Noise()
     section = entry.section("noise")
     std = section.number("std", low=0.0)
-    enters = section.choice("enters", tuple(NoiseEntry), NoiseEntry.MEASUREMENT)
+    enters = section.choice("enters", tuple(processes.NoiseEntry), processes.NoiseEntry.MEASUREMENT)
     section.finish()
-    return Noise(std, NoiseEntry(enters))
+    return processes.Noise(std, processes.NoiseEntry(enters))
 
 
 def _read_point(

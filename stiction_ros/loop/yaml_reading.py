@@ -45,25 +45,17 @@ def parse_yaml(text: str, where: str) -> Any:
 
 @dataclasses.dataclass(frozen=True)
 class TextLimits:
-    """What a YAML text from outside may need to be read: time and memory are bounded by these.
+    """What a YAML text from outside may need to be read: time and memory are bounded by these."""
 
-    Attributes:
-        characters: of the text.
-        depth: lists and mappings within one another.
-        nodes: values, keys, lists and mappings altogether.
-    """
-
-    characters: int = 65_536
-    depth: int = 20
-    nodes: int = 2000
+    characters: int = 65_536  # of the text
+    depth: int = 20  # lists and mappings within one another
+    nodes: int = 2000  # values, keys, lists and mappings altogether
 
 
 def parse_limited(text: str, where: str, limits: TextLimits = TextLimits()) -> Any:
     """Return what a YAML text from outside holds; nothing in the error repeats the text.
 
-    Raises:
-        InputError: the text is longer, deeper or fuller than the limits, has aliases, or is no
-            YAML.
+    It may be longer, deeper or fuller than the limits, have aliases, or be no YAML.
     """
     if len(text) > limits.characters:
         raise InputError(f"more than {limits.characters} characters", where=where)

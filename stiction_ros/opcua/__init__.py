@@ -1,7 +1,6 @@
 """The link to a control system by OPC UA: listen always, write under its grant only.
 
-What decides (pairing of tags to samples, quality, grant, limits) are plain values with the clock
-handed in; :mod:`.plant_link` alone knows the network. ``asyncua`` comes with the extra ``opcua``.
+:mod:`.plant_link` alone knows the network; ``asyncua`` comes with the extra ``opcua``.
 """
 
 from __future__ import annotations

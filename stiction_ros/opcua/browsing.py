@@ -18,19 +18,10 @@ MOST = 200_000  # nodes that are looked at
 
 
 async def browse(url: str, credentials: Credentials, root: str) -> dict[tuple[str, str], str]:
-    """Return node ids of all variables below ``root`` by group and name.
+    """Return node ids of all variables below ``root``, or the folder Objects, by group and name.
 
     ``FIC101.PV`` is PV of the group FIC101, and so is a variable PV in a folder FIC101. Node ids
-    name their namespace.
-
-    Args:
-        url: of the server.
-        credentials: of the session.
-        root: node id to begin at; empty for the folder Objects.
-
-    Raises:
-        InputError: no such node, or more than 200 000 nodes.
-        OSError, TimeoutError, asyncua.ua.UaError: the session was lost, or refused.
+    name their namespace. Errors are those of :mod:`.session`, and more than 200 000 nodes.
     """
     client = await open_client(url, credentials)
     try:
@@ -79,10 +70,7 @@ def loops_of(
 ) -> list[dict[str, Any]]:
     """Return the loops of a tag map, one for each group that has a PV and an OP.
 
-    Args:
-        found: node ids by group and name.
-        names: how the control system calls ``pv``, ``op``, ``sp`` and ``mode``.
-        sample_time: s.
+    ``names`` are what the control system calls ``pv``, ``op``, ``sp`` and ``mode``.
     """
     key_of = {name.casefold(): key for key, name in names.items()}
     groups: dict[str, dict[str, str]] = {}

@@ -11,50 +11,31 @@ FOREIGN = "another one lets the heartbeat rise"
 class GrantState(enum.Enum):
     """Where the handshake stands."""
 
-    LISTENING = "listening"
-    """Nothing is ever written."""
-    IDLE = "idle"
-    """Nothing is asked for; the plant's own controller has the valves."""
-    ASKED = "asked"
-    """Remote operation is asked for; the mode does not grant it yet."""
-    GRANTED = "granted"
-    """The mode of each valve grants it; OP is written."""
+    LISTENING = "listening"  # nothing is ever written
+    IDLE = "idle"  # nothing is asked for; the plant's own controller has the valves
+    ASKED = "asked"  # remote operation is asked for; the mode does not grant it yet
+    GRANTED = "granted"  # the mode of each valve grants it; OP is written
 
 
 @dataclasses.dataclass(frozen=True)
 class Facts:
-    """What is known at one look.
+    """What is known at one look."""
 
-    Attributes:
-        now: s on our clock.
-        granted: whether the mode of every valve grants remote operation, by good quality.
-        fault: what speaks against writing now; empty for nothing.
-        foreign: whether another one lets the heartbeat rise.
-    """
-
-    now: float
-    granted: bool
-    fault: str = ""
-    foreign: bool = False
+    now: float  # s on our clock
+    granted: bool  # whether the mode of every valve grants remote operation, by good quality
+    fault: str = ""  # what speaks against writing now; empty for nothing
+    foreign: bool = False  # whether another one lets the heartbeat rise
 
 
 @dataclasses.dataclass(frozen=True)
 class Grant:
-    """The state of the handshake, as a value.
+    """The state of the handshake, as a value."""
 
-    Attributes:
-        state: where it stands.
-        since: s on our clock.
-        reason: why it stands there.
-        wanted: whether it is to be asked for as soon as nothing speaks against it.
-        lost: whether it was asked for or granted before and is so no longer.
-    """
-
-    state: GrantState
-    since: float
-    reason: str
-    wanted: bool = False
-    lost: bool = False
+    state: GrantState  # where it stands
+    since: float  # s on our clock
+    reason: str  # why it stands there
+    wanted: bool = False  # whether it is to be asked for as soon as nothing speaks against it
+    lost: bool = False  # whether it was asked for or granted before and is so no longer
 
     @property
     def requesting(self) -> bool:

@@ -41,15 +41,10 @@ class Span:
 
 @dataclasses.dataclass(frozen=True)
 class TagHistory:
-    """What a server kept of one tag.
+    """What a server kept of one tag."""
 
-    Attributes:
-        stamps: ns, rising, shape (K,).
-        values: NaN where the quality is not good, shape (K,).
-    """
-
-    stamps: np.ndarray[Any, np.dtype[np.int64]]
-    values: FloatArray
+    stamps: np.ndarray[Any, np.dtype[np.int64]]  # ns, rising, shape (K,)
+    values: FloatArray  # NaN where the quality is not good, shape (K,)
 
     def at(self, times: np.ndarray[Any, np.dtype[np.int64]]) -> FloatArray:
         """Return the last values with stamps up to ``times`` (ns); NaN before the first."""
@@ -140,7 +135,7 @@ def _shown(reading: TagReading) -> str:
     return json.dumps(reading.value) if isinstance(reading.value, str) else repr(reading.number)
 
 
-def fetch(
+async def fetch(
     url: str,
     credentials: Credentials,
     files: dict[str, HistoryFile],
@@ -152,16 +147,6 @@ def fetch(
     Raises:
         InputError: the server cannot be reached, refuses, or keeps no history of a tag.
     """
-    asyncio.run(_fetch(url, credentials, files, span, progress))
-
-
-async def _fetch(
-    url: str,
-    credentials: Credentials,
-    files: dict[str, HistoryFile],
-    span: Span,
-    progress: Callable[[float], None],
-) -> None:
     from asyncua import ua
 
     from stiction_ros.opcua.session import describe
@@ -241,9 +226,6 @@ def record_of(tags: LoopTags, files: dict[str, HistoryFile], span: Span) -> Reco
     PV and SP of a sample are the last values with stamps up to it (and a jitter of a tenth of a
     sample), OP is the last up to its middle. The grid begins with the first value of each PV;
     samples with a bad value are marked so.
-
-    Raises:
-        InputError: a tag without values, or more than 10 million samples.
     """
     jitter, half = tags.sample_ns // JITTER, tags.sample_ns // 2
     pv = [files[output.pv].read() for output in tags.outputs]
@@ -282,10 +264,9 @@ def record_of(tags: LoopTags, files: dict[str, HistoryFile], span: Span) -> Reco
 
 
 def modes_of(tags: LoopTags, files: dict[str, HistoryFile], record: Record) -> list[str] | None:
-    """Return the mode of the loop at each sample, empty where it is not known.
+    """Return the mode of the loop at each sample, empty where it is not known; None without one.
 
-    That of a loop with several valves is the first that is not automatic. None when the map
-    names none.
+    That of a loop with several valves is the first that is not automatic.
     """
     grid = np.rint((record.start + record.time) * 1e9).astype(np.int64) + tags.sample_ns // JITTER
     found: list[list[str]] = []

@@ -28,63 +28,37 @@ MODE_REFUSES = "the mode does not grant it"
 
 @dataclasses.dataclass(frozen=True)
 class WriteOrder:
-    """What to write in one call of the service.
+    """What to write in one call of the service."""
 
-    Attributes:
-        loop: that it belongs to.
-        kind: of what.
-        values: node and value each.
-        modes: nodes that must say one of ``granted`` right before it is written.
-        granted: see ``modes``.
-        expires: s on our clock after which it is not written any more.
-    """
-
-    loop: str
-    kind: Use
-    values: tuple[tuple[str, float], ...]
-    expires: float
-    modes: tuple[str, ...] = ()
-    granted: tuple[str, ...] = ()
+    loop: str  # that it belongs to
+    kind: Use  # of what
+    values: tuple[tuple[str, float], ...]  # node and value each
+    expires: float  # s on our clock after which it is not written any more
+    modes: tuple[str, ...] = ()  # nodes that must say one of ``granted`` right before it is written
+    granted: tuple[str, ...] = ()  # see ``modes``
 
 
 @dataclasses.dataclass(frozen=True)
 class BridgeRules:
-    """How a loop is bridged.
+    """How a loop is bridged."""
 
-    Attributes:
-        speed: seconds of the plant per second of our clock.
-        writes: whether anything may be written at all.
-        asks: whether the grant is asked for at the start.
-        commander: full name of the node whose OP is taken; empty for the first that commands.
-        identity: number that tells our heartbeat from others', 1 … 32 767.
-    """
-
-    speed: float = 1.0
-    writes: bool = False
-    asks: bool = False
-    commander: str = ""
-    identity: int = 1
+    speed: float = 1.0  # seconds of the plant per second of our clock
+    writes: bool = False  # whether anything may be written at all
+    asks: bool = False  # whether the grant is asked for at the start
+    commander: str = ""  # node whose OP is taken, by full name; empty for the first to command
+    identity: int = 1  # number that tells our heartbeat from others', 1 … 32 767
 
 
 class LoopBridge:
     """Hands tags to a :class:`LoopSampler`, and OPs to the plant as long as it grants them.
 
     All times are s on one clock that only rises, handed in by the caller. The bridge itself
-    writes nothing: it returns orders, and is told by :meth:`written` what became of each.
-
-    What speaks against writing (and gives a grant back at once): no connection or no keep-alive;
-    a tag of the loop that the server refuses;
-    the plant's own heartbeat standing still; three samples in succession with a bad PV; OP in
-    force, mode or limits of bad quality; OP in force beyond the limits; no OP from the commander
-    for three samples; an OP that is not taken in time; a write that is refused, or that takes
-    longer than half the watchdog's time.
+    writes nothing: it returns orders, and is told by :meth:`written` what became of each. What is
+    against writing gives a grant back at once, as a write that is refused or takes too long does.
     """
 
     def __init__(self, tags: LoopTags, rules: BridgeRules, now: float) -> None:
-        """Begin to listen; ``rules.writes`` needs ``tags.grant``.
-
-        ``refused`` names the tags of the loop that the server refuses, each with why.
-        """
+        """Begin to listen; ``rules.writes`` needs ``tags.grant``."""
         self.tags, self.rules = tags, rules
         self.sampler = LoopSampler(tags, rules.speed)
         self.grant = begin(now, rules.writes and tags.grant is not None)
@@ -127,13 +101,7 @@ class LoopBridge:
     def refuse(
         self, read: Mapping[str, str], written: Mapping[str, str], now: float
     ) -> list[WriteOrder]:
-        """Take in which tags the server refuses now, and return what is to be written.
-
-        Args:
-            read: tags that are not listened to, of any loop, and why each.
-            written: the same of tags that are not written.
-            now: s on our clock.
-        """
+        """Take in which tags of any loop the server refuses, and why; return what to write."""
         found = [f"tag {tag} {read[tag]}" for tag in self.tags.read_tags() if tag in read]
         if self.rules.writes:
             mine = [tag for tag in self.tags.written_tags() if tag in written]
@@ -334,14 +302,7 @@ class LoopBridge:
     def written(
         self, order: WriteOrder, failure: str, seconds: float, now: float
     ) -> list[WriteOrder]:
-        """Take in what became of an order, and return what is to be written.
-
-        Args:
-            order: as it was returned.
-            failure: why it was not written; empty when it was.
-            seconds: that the server took.
-            now: s on our clock.
-        """
+        """Take in an order with its ``failure``, if any, and seconds; return what to write."""
         told = self.tags.grant
         assert told is not None
         self.counts[f"{order.kind.value}_{'failed' if failure else 'written'}"] += 1

@@ -16,16 +16,11 @@ WATCHED = 60  # OPs that are looked back at
 
 @dataclasses.dataclass(frozen=True)
 class OpLimits:
-    """Limits of the OPs of a loop.
+    """Limits of the OPs of a loop."""
 
-    Attributes:
-        low, high: %, shapes (m,).
-        rate: % per second, shape (m,).
-    """
-
-    low: FloatArray
+    low: FloatArray  # low, high: %, shapes (m,)
     high: FloatArray
-    rate: FloatArray
+    rate: FloatArray  # % per second, shape (m,)
 
     def within(self, op: FloatArray) -> bool:
         """Return whether each of ``op`` (m,), %, is a number between its limits."""
@@ -74,12 +69,9 @@ class RateWatch:
     def note(
         self, limits: OpLimits, wanted: FloatArray, in_force: FloatArray, op: FloatArray
     ) -> bool:
-        """Note an OP that follows ``in_force``; return whether the rate has cut it.
+        """Note an ``op`` that follows ``in_force``; return whether the rate has cut the wanted one.
 
-        Args:
-            limits: that were in force; what they cut is not the rate's.
-            wanted, in_force, op: what the controller wants, what was in force before, what is
-                written, shapes (m,), %.
+        What the other ``limits`` cut is not the rate's. Shapes (m,), %.
         """
         reachable = np.clip(wanted, limits.low, limits.high)
         cut = np.abs(reachable - op) > SLACK

@@ -33,23 +33,14 @@ ROOM = 200_000  # changes that wait here
 
 @dataclasses.dataclass(frozen=True)
 class LinkSettings:
-    """Where to, how, and what is heard there.
+    """Where to, how, and what is heard there."""
 
-    Attributes:
-        url: of the server.
-        credentials: of the session.
-        tags: that are subscribed to.
-        written: tags that may be written, and what for; empty for none.
-        publishing: s between two publications of the server.
-        asked_again: s until tags that the server refuses are tried again.
-    """
-
-    url: str
-    credentials: Credentials
-    tags: tuple[str, ...]
-    written: Mapping[str, Use] = dataclasses.field(default_factory=dict)
-    publishing: float = 0.1
-    asked_again: float = ASKED_AGAIN
+    url: str  # of the server
+    credentials: Credentials  # of the session
+    tags: tuple[str, ...]  # that are subscribed to
+    written: Mapping[str, Use] = dataclasses.field(default_factory=dict)  # and what for
+    publishing: float = 0.1  # s between two publications of the server
+    asked_again: float = ASKED_AGAIN  # s until tags that the server refuses are tried again
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -80,12 +71,7 @@ class Written:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Refused:
-    """Tags that the server refuses now, each with why; the others are listened to, or written.
-
-    Attributes:
-        read: tags that are not listened to.
-        written: tags that are not written.
-    """
+    """Tags that the server refuses now, each with why: those not listened to, those not written."""
 
     read: Mapping[str, str]
     written: Mapping[str, str]

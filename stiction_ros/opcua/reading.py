@@ -6,37 +6,26 @@ import dataclasses
 import enum
 import math
 
-LOCAL_OVERRIDE = 0x00960000
-"""Good_LocalOverride: somebody put the value in by hand; it is no measurement (OPC UA part 8)."""
+LOCAL_OVERRIDE = 0x00960000  # OPC UA part 8: put in by hand, so it is no measurement
 
 
 class TagQuality(enum.IntEnum):
     """How good a value is, the best first; the number stands in ``effort`` of ``pv``."""
 
     GOOD = 0
-    UNCERTAIN = 1
-    """Such as a last usable value, or one put in by hand."""
+    UNCERTAIN = 1  # such as a last usable value, or one put in by hand
     BAD = 2
-    SILENT = 3
-    """Nothing is heard of the server, or nothing was ever heard of the tag."""
+    SILENT = 3  # nothing is heard of the server, or nothing was ever heard of the tag
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class TagReading:
-    """One report of one tag.
+    """One report of one tag."""
 
-    Attributes:
-        value: as it was sent; None when there was none.
-        quality: of the value.
-        stamp: source time stamp, ns.
-        first: whether it opens a subscription; it then tells the present value, whose stamp may
-            be long past.
-    """
-
-    value: float | str | None
-    quality: TagQuality
-    stamp: int
-    first: bool = False
+    value: float | str | None  # as it was sent; None when there was none
+    quality: TagQuality  # of the value
+    stamp: int  # source time stamp, ns
+    first: bool = False  # whether it opens a subscription: the present value, maybe long past
 
     @property
     def number(self) -> float:

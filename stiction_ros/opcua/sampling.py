@@ -27,23 +27,15 @@ NOTHING = TagReading(None, TagQuality.SILENT, 0)
 
 @dataclasses.dataclass(frozen=True)
 class PlantSample:
-    """One sample of a loop.
+    """One sample of a loop."""
 
-    Attributes:
-        stamp: ns, by the plant's clock.
-        pv, sp, dv: shapes (p,), (p,), (d,); NaN where the quality is not good.
-        pv_age: s of the plant's time since each PV changed, shape (p,).
-        pv_quality: of each PV.
-        op_before: OP in force in the sample before, shape (m,), %; NaN where not known.
-    """
-
-    stamp: int
-    pv: FloatArray
+    stamp: int  # ns, by the plant's clock
+    pv: FloatArray  # pv, sp, dv: shapes (p,), (p,), (d,); NaN where the quality is not good
     sp: FloatArray
     dv: FloatArray
-    pv_age: FloatArray
-    pv_quality: tuple[TagQuality, ...]
-    op_before: FloatArray
+    pv_age: FloatArray  # s of the plant's time since each PV changed, shape (p,)
+    pv_quality: tuple[TagQuality, ...]  # of each PV
+    op_before: FloatArray  # OP in force in the sample before, shape (m,), %; NaN where not known
 
 
 class PlantClock:
@@ -79,21 +71,15 @@ class PlantClock:
 class LoopSampler:
     """Makes samples at every sample time of what tags report when they change.
 
-    The rule, with t_k the time of sample k, T the sample time and a jitter of T/10:
+    With t_k the time of sample k, T the sample time and a jitter of T/10:
 
-    - PV, SP and DV of sample k are the last values with stamps up to t_k + jitter: a value holds
-      until the next one comes.
-    - Sample k is closed when each PV has a stamp within the jitter of t_k or later, and
-      otherwise T/2 after t_k. What comes later for it is ``late`` and counts for the next.
-    - OP in force in sample k is the last value with a stamp up to t_k + T/2: what acted for most
-      of it. It is told with sample k + 1.
-    - t_0 is the stamp of the first PV that changes (after three samples without any, or ten while
-      a PV has not been reported at all: the newest stamp heard). The grid follows slow shifts of
-      the PV's stamps, and moves when ten in succession lie beside it by the same amount.
-    - A stamp before the last one of its tag is of the past, one more than 3 samples ahead of the
-      plant's time of the future: refused and counted. After three in succession the tag has no
-      value; the tenth is believed, and begins a new run when it is that of a PV. The first
-      report of a subscription tells the present, whatever its stamp.
+    - PV, SP and DV of sample k are the last values with stamps up to t_k + jitter. It closes when
+      each PV has a stamp within the jitter of t_k or later, and otherwise T/2 after t_k.
+    - OP in force in sample k is the last with a stamp up to t_k + T/2; it is told with k + 1.
+    - t_0 is the stamp of the first PV that changes, or else the newest stamp heard. The grid
+      follows slow shifts of the PV's stamps, and moves when ten in succession lie beside it alike.
+    - Stamps of the past and of the future are refused and counted. After three in succession the
+      tag has no value; the tenth is believed, and begins a new run when it is that of a PV.
     - A value that is not good, or of a server that is silent, is NaN.
 
     Attributes:
@@ -148,7 +134,9 @@ class LoopSampler:
         present = self._clock.now(now)
         found: list[PlantSample] = []
         while self._next is not None and present is not None:
-            ready = alive and self._fresh(self._next - self._jitter)
+            ready = alive and all(
+                self.latest(tag).stamp >= self._next - self._jitter for tag in self._pv
+            )
             if not ready and present < self._next + self.tags.sample_ns // SETTLE:
                 break
             if ready and present > self._next + LOST * self.tags.sample_ns:
@@ -201,11 +189,7 @@ class LoopSampler:
         self.counts["new_runs"] += 1
 
     def _begin_without_change(self, now: float) -> None:
-        """Begin at the newest stamp when no PV has changed for three samples.
-
-        A server may report the tags of a new subscription in several parts, so a PV that was
-        not reported yet is given longer.
-        """
+        """Begin at the newest stamp when no PV has changed for three samples."""
         if self._next is not None or self._heard_at is None:
             return
         patience = FAR if all(self._changes[tag] for tag in self._pv) else UNREPORTED
@@ -243,10 +227,6 @@ class LoopSampler:
         self._next += lost * self.tags.sample_ns
 
     # ---- samples ---------------------------------------------------------------------------
-
-    def _fresh(self, since: int) -> bool:
-        """Return whether each PV has a stamp at or after ``since``."""
-        return all(self.latest(tag).stamp >= since for tag in self._pv)
 
     def _close(self, stamp: int, alive: bool) -> PlantSample:
         tags, cut = self.tags, stamp + self._jitter

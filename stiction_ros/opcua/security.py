@@ -23,22 +23,14 @@ SECURITY = ("sign_and_encrypt", "none")
 
 @dataclasses.dataclass(frozen=True)
 class Credentials:
-    """How a session is secured; nothing secret is kept here, only where it stands.
+    """How a session is secured; nothing secret is kept here, only where it stands."""
 
-    Attributes:
-        security: ``sign_and_encrypt`` (Basic256Sha256) or ``none``.
-        certificate, private_key: files of ours, DER and PEM.
-        server_certificate: file of the certificate that the server must show, DER.
-        user: name; empty for none.
-        password_file: file of the password.
-    """
-
-    security: str = SECURITY[0]
-    certificate: str = ""
+    security: str = SECURITY[0]  # ``sign_and_encrypt`` (Basic256Sha256) or ``none``
+    certificate: str = ""  # certificate, private_key: files of ours, DER and PEM
     private_key: str = ""
-    server_certificate: str = ""
-    user: str = ""
-    password_file: str = ""
+    server_certificate: str = ""  # file of the certificate that the server must show, DER
+    user: str = ""  # name; empty for none
+    password_file: str = ""  # file of the password
 
     @classmethod
     def of(cls, given: object) -> Credentials:
@@ -46,11 +38,7 @@ class Credentials:
         return cls(*(getattr(given, field.name) for field in dataclasses.fields(cls)))
 
     def check(self, writes: bool) -> None:
-        """Refuse what cannot be connected with, and writing without encryption or user.
-
-        Raises:
-            InputError: a file that lacks, that others may read, or that has expired.
-        """
+        """Refuse what cannot be connected with, and writing without encryption or user."""
         if self.security == "none":
             if writes:
                 raise InputError(
@@ -81,11 +69,7 @@ class Credentials:
             self.password()
 
     def password(self) -> str:
-        """Return the password from its file.
-
-        Raises:
-            InputError: none is named, it lacks, or others may read it.
-        """
+        """Return the password from its file, which nobody else may read."""
         if not self.password_file:
             raise InputError("password_file is needed", where=f"user {self.user}")
         path = Path(self.password_file)
@@ -151,27 +135,17 @@ def fingerprint(certificate: x509.Certificate) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Identity:
-    """What a certificate says of its owner.
+    """What a certificate says of its owner."""
 
-    Attributes:
-        uri: of the application.
-        hosts: names and addresses.
-        server: whether it is a server's, else a client's.
-        begin: first moment of validity.
-        days: of validity.
-    """
-
-    uri: str
-    hosts: tuple[str, ...]
-    server: bool
-    begin: datetime.datetime
-    days: int = DAYS
+    uri: str  # of the application
+    hosts: tuple[str, ...]  # names and addresses
+    server: bool  # whether it is a server's, else a client's
+    begin: datetime.datetime  # first moment of validity
+    days: int = DAYS  # of validity
 
 
 def make_certificate(identity: Identity, certificate: Path, private_key: Path) -> None:
-    """Make a key and a self-signed application certificate (OPC UA part 6, 6.2.2).
-
-    The key is written for its owner alone.
+    """Make a key, for its owner alone, and a self-signed certificate (OPC UA part 6, 6.2.2).
 
     Raises:
         InputError: one of the files is there already, or cannot be written.
@@ -205,9 +179,7 @@ def make_certificate(identity: Identity, certificate: Path, private_key: Path) -
         .sign(key, hashes.SHA256())
     )
     pem = key.private_bytes(
-        serialization.Encoding.PEM,
-        serialization.PrivateFormat.PKCS8,
-        serialization.NoEncryption(),
+        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
     )
     write_secret(private_key, pem)
     certificate.write_bytes(made.public_bytes(serialization.Encoding.DER))

@@ -52,11 +52,7 @@ class ServerTags:
         return self._names.get(node, [])
 
     async def find(self) -> None:
-        """Ask for the nodes of all refused tags and for the types of those that are written.
-
-        Raises:
-            OSError, TimeoutError, asyncua.ua.UaError: the session is lost.
-        """
+        """Ask for the nodes of all refused tags and for the types of those that are written."""
         spaces = await self._client.get_namespace_array()
         for tag in dict.fromkeys((*self.unread, *self.unwritten)):
             try:
@@ -90,11 +86,7 @@ class ServerTags:
             self.unwritten[tag] = f"is of type {kind.name}, and {NEEDS[use]}"
 
     async def subscribe(self, subscription: Any, interval: float) -> None:
-        """Subscribe to what is not subscribed yet, sampled every ``interval`` ms.
-
-        Raises:
-            OSError, TimeoutError, asyncua.ua.UaError: the session is lost.
-        """
+        """Subscribe to what is not subscribed yet, sampled every ``interval`` ms."""
         from asyncua import ua
 
         tags = [tag for tag in self.unread if tag in self.nodes]

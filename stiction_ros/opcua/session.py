@@ -12,15 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stiction_ros.errors import InputError
+from stiction_ros.opcua import security
 from stiction_ros.opcua.loop_bridge import MODE_REFUSES, WriteOrder, mode_text
 from stiction_ros.opcua.reading import TagQuality, TagReading, quality_of
-from stiction_ros.opcua.security import (
-    CLIENT_URI,
-    Credentials,
-    check_dates,
-    fingerprint,
-    load_certificate,
-)
 
 if TYPE_CHECKING:
     from asyncua import Client, ua
@@ -37,23 +31,23 @@ SAID = {
 EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 
 
-async def open_client(url: str, credentials: Credentials) -> Client:
+async def open_client(url: str, credentials: security.Credentials) -> Client:
     """Return a client with an active session, as the credentials ask for.
 
     Raises:
         InputError: files that cannot be used, or certificates that have expired.
-        OSError, TimeoutError, asyncua.ua.UaError: the server cannot be reached, or refuses.
+        OSError, TimeoutError, asyncua.ua.UaError: as whatever asks the server.
     """
     from asyncua import Client, ua
     from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
 
     logging.getLogger("asyncua").setLevel(logging.CRITICAL)
     client = Client(url, timeout=ANSWER, watchdog_intervall=PROBE)
-    client.application_uri = CLIENT_URI
+    client.application_uri = security.CLIENT_URI
     client.name = client.description = "stiction_ros"
     if credentials.security != "none":
         for path in (credentials.certificate, credentials.server_certificate):
-            check_dates(load_certificate(Path(path)), path)
+            security.check_dates(security.load_certificate(Path(path)), path)
         await client.set_security(
             SecurityPolicyBasic256Sha256,
             certificate=Path(credentials.certificate),
@@ -82,11 +76,7 @@ def is_open(client: Client) -> bool:
 
 
 async def shown_certificate(url: str) -> x509.Certificate | None:
-    """Return what a server shows for signed and encrypted sessions; None where it has none.
-
-    Raises:
-        OSError, TimeoutError, asyncua.ua.UaError: the server cannot be asked.
-    """
+    """Return what a server shows for signed and encrypted sessions; None where it has none."""
     from asyncua import Client, ua
     from asyncua.crypto.uacrypto import x509_from_der
 
@@ -106,19 +96,18 @@ async def _compare(url: str, pinned: Path) -> None:
         shown = await shown_certificate(url)
     except (OSError, TimeoutError, ua.UaError):
         return  # it does not tell
-    if shown is not None and fingerprint(shown) != fingerprint(load_certificate(pinned)):
+    if shown is not None and security.fingerprint(shown) != security.fingerprint(
+        security.load_certificate(pinned)
+    ):
         raise InputError(
-            f"is not what the server shows now ({fingerprint(shown)[:23]}…)",
+            f"is not what the server shows now ({security.fingerprint(shown)[:23]}…)",
             where=str(pinned),
             fix="ask the control engineer, then pin it again",
         )
 
 
 async def _connect(client: Client) -> None:
-    """Connect; a connection that the other side has closed is not waited for.
-
-    The library waits for the answer to a question that it puts to a closed connection.
-    """
+    """Connect; a connection that the other side has closed is not waited for."""
     opening, closed = asyncio.create_task(client.connect()), 0
     try:
         while not opening.done() and closed < CLOSED:
@@ -135,11 +124,7 @@ async def _connect(client: Client) -> None:
 
 
 async def node_ids(client: Client, tags: Sequence[str]) -> dict[str, ua.NodeId]:
-    """Return the node id of each tag; ``nsu=URI;`` is looked up in the server's namespaces.
-
-    Raises:
-        InputError: a namespace that the server does not have, or no node id.
-    """
+    """Return the node id of each tag by :func:`node_id`."""
     spaces = await client.get_namespace_array()
     return {tag: node_id(tag, spaces) for tag in dict.fromkeys(tags)}
 
@@ -196,11 +181,7 @@ def describe(error: BaseException) -> str:
 
 
 async def kind_of(client: Client, node: ua.NodeId) -> ua.VariantType:
-    """Return the type of value that a node takes.
-
-    Raises:
-        OSError, TimeoutError, asyncua.ua.UaError: there is no such node, or the session is lost.
-    """
+    """Return the type of value that a node takes."""
     return await client.get_node(node).read_data_type_as_variant_type()
 
 

@@ -37,25 +37,15 @@ class OutputTags:
 
 @dataclasses.dataclass(frozen=True)
 class ValveTags:
-    """Tags of one valve.
+    """Tags of one valve."""
 
-    Attributes:
-        name: of the valve.
-        op_read: tag of the OP in force, %.
-        op: tag that a remote OP is written to, %; empty where nothing may be written.
-        mode: tag of the mode of its controller; empty where it is not known.
-        limits: of what may be written, %.
-        rate: largest change of what is written, % per second of the plant's time.
-        low, high: tags of limits that the plant itself sets, %; empty for none.
-    """
-
-    name: str
-    op_read: str
-    op: str = ""
-    mode: str = ""
-    limits: tuple[float, float] = (0.0, 100.0)
-    rate: float = 1.0
-    low: str = ""
+    name: str  # of the valve
+    op_read: str  # tag of the OP in force, %
+    op: str = ""  # tag that a remote OP is written to, %; empty where nothing may be written
+    mode: str = ""  # tag of the mode of its controller; empty where it is not known
+    limits: tuple[float, float] = (0.0, 100.0)  # of what may be written, %
+    rate: float = 1.0  # largest change of what is written, % per second of the plant's time
+    low: str = ""  # low, high: tags of limits that the plant itself sets, %; empty for none
     high: str = ""
 
 
@@ -70,44 +60,27 @@ class DisturbanceTag:
 
 @dataclasses.dataclass(frozen=True)
 class GrantTags:
-    """The handshake of a loop.
+    """The handshake of a loop."""
 
-    Attributes:
-        request: tag that says 1 while remote operation is asked for, else 0.
-        granted: what the mode of each valve says while it is granted.
-        heartbeat: tag that we let rise; the plant takes over when it stands still.
-        alive: tag that the plant lets rise; empty for none.
-        watchdog: s of standing still after which either side gives the other up.
-    """
-
-    request: str
-    granted: tuple[str, ...]
-    heartbeat: str
-    alive: str = ""
-    watchdog: float = WATCHDOG
+    request: str  # tag that says 1 while remote operation is asked for, else 0
+    granted: tuple[str, ...]  # what the mode of each valve says while it is granted
+    heartbeat: str  # tag that we let rise; the plant takes over when it stands still
+    alive: str = ""  # tag that the plant lets rise; empty for none
+    watchdog: float = WATCHDOG  # s of standing still after which either side gives the other up
 
 
 @dataclasses.dataclass(frozen=True)
 class LoopTags:
-    """Tags of one loop.
+    """Tags of one loop."""
 
-    Attributes:
-        loop: its name.
-        namespace: of its topics below that of the node; empty for the node's own.
-        sample_time: s.
-        outputs, valves, disturbances: in the order of the messages.
-        grant: how writing is granted; None where nothing may be written.
-        uncertain: whether values of uncertain quality count.
-    """
-
-    loop: str
-    namespace: str
-    sample_time: float
-    outputs: tuple[OutputTags, ...]
+    loop: str  # its name
+    namespace: str  # of its topics below that of the node; empty for the node's own
+    sample_time: float  # s
+    outputs: tuple[OutputTags, ...]  # outputs, valves, disturbances: in the order of the messages
     valves: tuple[ValveTags, ...]
     disturbances: tuple[DisturbanceTag, ...] = ()
-    grant: GrantTags | None = None
-    uncertain: bool = False
+    grant: GrantTags | None = None  # how writing is granted; None where nothing may be written
+    uncertain: bool = False  # whether values of uncertain quality count
 
     def read_tags(self) -> tuple[str, ...]:
         """Return the tags that are listened to, each once."""
@@ -137,23 +110,14 @@ class LoopTags:
 
 @dataclasses.dataclass(frozen=True)
 class TagMap:
-    """The loops of one server.
+    """The loops of one server."""
 
-    Attributes:
-        server: its address, ``opc.tcp://HOST:PORT/PATH``; empty when it is given elsewhere.
-        loops: in the order of the file.
-    """
-
-    server: str
-    loops: tuple[LoopTags, ...]
+    server: str  # its address, ``opc.tcp://HOST:PORT/PATH``; empty when it is given elsewhere
+    loops: tuple[LoopTags, ...]  # in the order of the file
 
     @classmethod
     def load(cls, path: Path | str) -> TagMap:
-        """Read a ``*.tags.yaml``.
-
-        Raises:
-            InputError: anything missing, unknown or written by two, in one line.
-        """
+        """Read a ``*.tags.yaml``; anything missing, unknown or written by two is an InputError."""
         top = Section(load_yaml(path), str(path))
         server = top.text("server") if "server" in top else ""
         loops = tuple(_loop(section) for section in top.sections("loops"))
@@ -170,10 +134,7 @@ class TagMap:
 
 
 def check_address(address: str, where: str) -> None:
-    """Raise InputError unless ``address`` is one of OPC UA over TCP without a password in it.
-
-    Its port, where it names one, is 1 to 65535.
-    """
+    """Raise InputError unless ``address`` is one of OPC UA over TCP without a password in it."""
     if not re.fullmatch(r"opc\.tcp://[^\s/]+(/\S*)?", address):
         raise InputError("is no address of a server", where=where, fix="write opc.tcp://HOST:PORT")
     if "@" in address:

@@ -19,17 +19,10 @@ from stiction_ros.texts import DAY, HOUR
 WIDE, TALL = 1000, 240
 """Units across the area of a figure over time, which is as wide as its page, and its height, px."""
 
-SIDE = 300
-"""Width and height of a figure that has no time."""
-
-MOST = 3000
-"""Points of a curve; of a longer one the lowest and highest of each stretch are kept."""
-
-ROOM = 0.04
-"""Share of the range that is left free above and below."""
-
-KINDS = ("pv", "op", "stem", "free", "sp", "ink")
-"""Colours of curves that are of one kind."""
+SIDE = 300  # width and height of a figure that has no time
+MOST = 3000  # points of a curve; of a longer one the lowest and highest of each stretch are kept
+ROOM = 0.04  # share of the range that is left free above and below
+KINDS = ("pv", "op", "stem", "free", "sp", "ink")  # colours of curves that are of one kind
 
 CALENDAR = [
     *(1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800),

@@ -11,11 +11,15 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
 from stiction_ros.identification.answer.summary import as_html
+from stiction_ros.identification.answer.words import cause_of
+from stiction_ros.identification.result.cause import CauseKind
 from stiction_ros.intake.record_file import record_of
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import MOST, SCRIPT, Curve, against, over_time
-from stiction_ros.pages.window import Window
 from stiction_ros.records.record import Record
+
+CYCLES = 4
+UNCYCLED = 240  # samples of the window where there is no cycle
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,13 +102,7 @@ def plot(
 
 
 def close_look(record: Record, found: Identification, units: Units) -> str:
-    """Return four cycles of one valve over time, and PV and the stem against OP.
-
-    Args:
-        record: that was looked at.
-        found: identification of this record.
-        units: of its signals.
-    """
+    """Return four cycles of one valve over time, and PV and the stem against OP."""
     window = Window.of(record, found)
     rows, i, j = window.rows, window.output, window.valve
     shown = window.named(record.sample_time)
@@ -132,13 +130,7 @@ def close_look(record: Record, found: Identification, units: Units) -> str:
 
 
 def all_signals(record: Record, stem: FloatArray | None, units: Units) -> str:
-    """Return each signal of a record over its time.
-
-    Args:
-        record: its samples that are not finite leave a gap.
-        stem: estimated stems, shape (N, m), % of travel; None where there is none.
-        units: of its signals.
-    """
+    """Return each signal of a record over its time; a ``stem`` is an estimate, shape (N, m), %."""
     drawn = over_record(record, stem, units)
     return f"<h2>Signals</h2>{''.join(drawn)}"
 
@@ -146,14 +138,7 @@ def all_signals(record: Record, stem: FloatArray | None, units: Units) -> str:
 def over_record(
     record: Record, stem: FloatArray | None, units: Units, view: View = View()
 ) -> list[str]:
-    """Return a figure of each PV and then of each OP.
-
-    Args:
-        record: its samples that are not finite leave a gap.
-        stem: estimated stems, shape (N, m), % of travel; None where there is none.
-        units: of its signals.
-        view: what of it is drawn.
-    """
+    """Return a figure of each PV and then of each OP, as :func:`all_signals`, of the ``view``."""
     rows, time = view.rows, record.time[view.rows]
     known = stem is not None or record.stem is not None
     drawn = [
@@ -229,3 +214,45 @@ def _planes(record: Record, stem: FloatArray | None, window: Window, units: Unit
             )
         )
     return f"<div class='pair'>{''.join(drawn)}</div>"
+
+
+@dataclasses.dataclass(frozen=True)
+class Window:
+    """The part of a record that is shown closely."""
+
+    valve: int  # valve, output: indices
+    output: int
+    first: int  # first, last: its first row and the one behind its last
+    last: int
+    period: float | None  # of the cycle, s; None where there is none
+
+    @classmethod
+    def of(cls, record: Record, found: Identification) -> Window:
+        """Return four cycles from the middle of the longest good part.
+
+        The valve is the one with the widest band, the output the one that oscillates with it.
+        """
+        valve = max(range(len(found.valves)), key=lambda j: found.valves[j].band_share, default=0)
+        cause = cause_of(found, valve) if found.valves else None
+        outputs = [i for i, model in enumerate(found.outputs) if model.cause is cause]
+        output = outputs[0] if cause is not None and outputs else min(valve, record.pv.shape[1] - 1)
+        cycles = cause is not None and cause.kind is not CauseKind.NONE
+        period = cause.period if cause is not None and cycles else None
+        parts = record.usable_rows() or [(0, len(record))]
+        begin, end = max(parts, key=lambda part: part[1] - part[0])
+        wanted = UNCYCLED if period is None else round(CYCLES * period / record.sample_time) + 1
+        wanted = min(wanted, end - begin)
+        first = begin + (end - begin - wanted) // 2
+        return cls(valve, output, first, first + wanted, period)
+
+    @property
+    def rows(self) -> slice:
+        """Its rows."""
+        return slice(self.first, self.last)
+
+    def named(self, sample_time: float) -> str:
+        """Return what is shown, in words."""
+        if self.period is None:
+            return f"{self.last - self.first} samples without a regular cycle"
+        cycles = (self.last - self.first - 1) * sample_time / self.period
+        return f"about {cycles:.2g} cycles of {self.period:.3g} s on average"

@@ -1,12 +1,8 @@
 """The grid search that the paper compares with, reference [20], as published.
 
-A triangular grid over (f_S, f_D) of all valves at once. For one point after another the stem is
-simulated, by the smoothed law (5) at τ = 10⁴; for one delay after another the ARX coefficients
-are found by least squares, and SE (14) is kept. The lowest mean SE wins. Nothing is shared
-between points: this is the baseline, and its cost is the number of points times the number of
-choices of delays.
-
-A record of p outputs has p independent least-squares problems per choice of delays.
+For each point of a triangular grid over (f_S, f_D) of all valves the stem is simulated, by the
+smoothed law (5) at τ = 10⁴; for each choice of delays ARX is fitted by least squares. The lowest
+mean SE (14) wins. Nothing is shared between points: this is the baseline.
 """
 
 from __future__ import annotations
@@ -14,20 +10,14 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.paper.equation_error import EquationError, fit_outputs
-from stiction_ros.paper.one_step_result import (
-    Answer,
-    check_record,
-    delay_choices,
-    friction_limits,
-    result,
-)
+from stiction_ros.paper import one_step_result as one_step
+from stiction_ros.paper.one_step_result import EquationError, fit_outputs
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification
 from stiction_ros.paper.smoothed_laws import final_smoothing, smooth_law
@@ -41,19 +31,12 @@ Progress = Callable[[float], None]
 
 @dataclasses.dataclass(frozen=True)
 class GridPoint:
-    """The best point of a grid.
+    """The best point of a grid."""
 
-    Attributes:
-        friction: rows (f_S, f_D), shape (m, 2), %.
-        delays: for each output the t_d of each valve, samples.
-        found: stems and ARX models there; its ``squared_error`` is (12a).
-        points: grid points that were worked through.
-    """
-
-    friction: FloatArray
-    delays: Delays
-    found: EquationError
-    points: int
+    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
+    delays: Delays  # for each output the t_d of each valve, samples
+    found: EquationError  # stems and ARX models there; its ``squared_error`` is (12a)
+    points: int  # grid points that were worked through
 
 
 def nodes(limit: float, step: float) -> FloatArray:
@@ -69,21 +52,17 @@ def nodes(limit: float, step: float) -> FloatArray:
 
 def count_points(record: Record, options: PaperOptions) -> int:
     """Return the number of grid points of a record, by which a benchmark extrapolates."""
-    sides = np.floor(friction_limits(record, options) / options.grid_step * (1.0 + 1e-12)) + 1.0
+    sides = (
+        np.floor(one_step.friction_limits(record, options) / options.grid_step * (1.0 + 1e-12))
+        + 1.0
+    )
     return int(np.prod([side * (side + 1.0) / 2.0 for side in sides.tolist()]))
 
 
 def identify_by_grid(
-    record: Record,
-    options: PaperOptions | None = None,
-    progress: Progress | None = None,
+    record: Record, options: PaperOptions | None = None, progress: Progress | None = None
 ) -> PaperIdentification:
-    """Identify by the grid search.
-
-    Args:
-        record: what was measured.
-        options: orders, delay range, ``grid_step``, ``grid_law``; None for the defaults.
-        progress: called with the share done, 0 to 1.
+    """Identify by the grid search; the options have its ``grid_step`` and ``grid_law``.
 
     Raises:
         InputError: a record that no model can be fitted to, a step coarser than the OP span,
@@ -91,21 +70,21 @@ def identify_by_grid(
     """
     begun = time.perf_counter()
     options = options or PaperOptions(method="grid")
-    orders = check_record(record, options)
+    orders = one_step.check_record(record, options)
     best = search(record, options, orders, progress or (lambda share: None))
     stable = all(fit.largest_root < 1.0 for fit in best.found.fits)
     reason = "" if stable else "the process at the best point is unstable"
-    answer = Answer(
+    answer = one_step.Answer(
         reason, best.friction, best.delays, best.found.squared_error, best.points, best.found
     )
-    return result(record, options, answer, time.perf_counter() - begun)
+    return one_step.result(record, options, answer, time.perf_counter() - begun)
 
 
 def search(
     record: Record, options: PaperOptions, orders: ArxOrders, progress: Progress
 ) -> GridPoint:
     """Return the grid point and delays of lowest mean SE; see :func:`identify_by_grid`."""
-    limits = friction_limits(record, options)
+    limits = one_step.friction_limits(record, options)
     if options.grid_step > limits.max():
         raise InputError(
             f"step {options.grid_step:g} % is coarser than the largest friction {limits.max():g} %",
@@ -119,11 +98,13 @@ def search(
             where="grid_step",
             fix="choose a larger step or a friction limit",
         )
-    choices = delay_choices(record, options, MAX_CHOICES)
+    choices = one_step.delay_choices(record, options, MAX_CHOICES)
     law, hard = smooth_law(options.law), options.grid_law == "hard"
     smoothing = final_smoothing(limits)
     best: GridPoint | None = None
-    for number, friction in enumerate(_points(limits, options.grid_step), start=1):
+    triangles = [nodes(limit, options.grid_step) for limit in limits.tolist()]
+    for number, rows in enumerate(itertools.product(*triangles), start=1):
+        friction = np.array(rows)
         stems = (
             law.hard_stems(record.op, friction)
             if hard
@@ -136,9 +117,3 @@ def search(
         progress(number / total)
     assert best is not None  # every triangle has its corner (0, 0)
     return best
-
-
-def _points(limits: FloatArray, step: float) -> Iterator[FloatArray]:
-    """Yield the frictions of all valves, shape (m, 2), one grid point after another."""
-    for rows in itertools.product(*(nodes(limit, step) for limit in limits.tolist())):
-        yield np.array(rows)

@@ -11,24 +11,14 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.identification_options import limited
 from stiction_ros.identification.linear.data import nrmse_fit
-from stiction_ros.identification.problem.input_checks import (
-    TOO_SHORT,
-    require_samples,
-    require_signals,
-)
-from stiction_ros.identification.result.identification import (
-    FitStatus,
-    OutputModel,
-    ValveEstimate,
-    VerdictKind,
-)
-from stiction_ros.paper.equation_error import EquationError, fit_outputs
+from stiction_ros.identification.problem import input_checks
+from stiction_ros.identification.result import identification
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification, SearchLog, SolvedStart
 from stiction_ros.paper.smoothed_laws import smooth_law
 from stiction_ros.paper.sustained_oscillation import sustained_oscillations
 from stiction_ros.records.record import Record
-from stiction_ros.signals.arx_fit import ArxFit, ArxOrders, Delays
+from stiction_ros.signals.arx_fit import ArxFit, ArxOrders, Delays, fit_arx
 
 DEFAULT_ORDER = 3
 MIN_SAMPLES = 60
@@ -40,49 +30,30 @@ NO_EVIDENCE = (
 
 @dataclasses.dataclass(frozen=True)
 class Answer:
-    """Where a method ended.
+    """Where a method ended."""
 
-    Attributes:
-        reason: why the answer is not to be trusted; empty when it is.
-        friction: rows (f_S, f_D), shape (m, 2), %.
-        delays: t_d per output and valve, samples.
-        objective: (12a) as the method has it; None for that of the hard law.
-        points: frictions at which it was evaluated.
-        found: models and stems that go with it; None for those of the hard law.
-        starts: every run of a solver.
-    """
-
-    reason: str
-    friction: FloatArray
-    delays: Delays
-    objective: float | None
-    points: int
-    found: EquationError | None = None
-    starts: tuple[SolvedStart, ...] = ()
+    reason: str  # why the answer is not to be trusted; empty when it is
+    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
+    delays: Delays  # t_d per output and valve, samples
+    objective: float | None  # (12a) as the method has it; None for that of the hard law
+    points: int  # frictions at which it was evaluated
+    found: EquationError | None = None  # models and stems; None for those of the hard law
+    starts: tuple[SolvedStart, ...] = ()  # every run of a solver
 
 
 def check_record(record: Record, options: PaperOptions) -> ArxOrders:
-    """Return the orders and ε of a record that can be worked on.
-
-    Raises:
-        InputError: a law that these methods do not have, no valve or output, a constant
-            signal, or too few samples.
-    """
+    """Return the orders and ε of a record that can be worked on; else InputError."""
     smooth_law(options.law)
-    require_signals(record)
+    input_checks.require_signals(record)
     orders = orders_of(record, options)
     unknowns = orders.output + len(record.valves) * orders.input
     needed = orders.first + max(MIN_SAMPLES, 5 * (unknowns + 3))
-    require_samples(record, needed, TOO_SHORT)
+    input_checks.require_samples(record, needed, input_checks.TOO_SHORT)
     return orders
 
 
 def orders_of(record: Record, options: PaperOptions) -> ArxOrders:
-    """Return the orders of a record, per channel where the options give them so, and ε.
-
-    Raises:
-        InputError: a number of orders that is not that of the outputs or of the valves.
-    """
+    """Return the orders of a record, per channel where the options give them so, and ε."""
     m, p = len(record.valves), len(record.outputs)
     longest = [options.delay[1]] * m
     output = DEFAULT_ORDER if options.output_order is None else options.output_order
@@ -113,9 +84,6 @@ def friction_limits(record: Record, options: PaperOptions) -> FloatArray:
 
     It is Δu of the sustained oscillation unless the options give another, and never more than
     OP spans.
-
-    Raises:
-        InputError: a number of limits that is not that of the valves.
     """
     if options.friction_limit is None:
         found = [one.span for one in sustained_oscillations(record)]
@@ -124,11 +92,7 @@ def friction_limits(record: Record, options: PaperOptions) -> FloatArray:
 
 
 def delay_choices(record: Record, options: PaperOptions, most: int) -> list[Delays]:
-    """Return all T^(m p) choices of delays, one delay per output and valve.
-
-    Raises:
-        InputError: more than ``most`` choices.
-    """
+    """Return all T^(m p) choices of delays, one delay per output and valve, ``most`` at most."""
     low, high = options.delay
     channels = len(record.valves) * len(record.outputs)
     count = (high - low + 1) ** channels
@@ -181,7 +145,7 @@ def result(
         if delay == high > low
     ]
     return PaperIdentification(
-        status=FitStatus.NO_MODEL if answer.reason else FitStatus.OK,
+        status=identification.FitStatus.NO_MODEL if answer.reason else identification.FitStatus.OK,
         reason=answer.reason,
         method=options.method,
         samples=len(record),
@@ -207,16 +171,13 @@ def valve_estimate(
     stem: FloatArray,
     limit: float,
     law: str = "he",
-) -> ValveEstimate:
-    """Return a point estimate: undecided, with intervals from 0 to the largest friction.
-
-    f_D is at most f_S, so both intervals reach from 0 to f_max.
-    """
+) -> identification.ValveEstimate:
+    """Return a point estimate: undecided, with intervals from 0 to f_max, as f_D ≤ f_S."""
     static, dynamic = float(friction[0]), float(min(friction[0], friction[1]))
     moves = int(np.count_nonzero(np.abs(np.diff(stem)) > 1e-9 * max(limit, 1e-300)))
-    return ValveEstimate(
+    return identification.ValveEstimate(
         name=record.valves[valve],
-        verdict=VerdictKind.UNDECIDED,
+        verdict=identification.VerdictKind.UNDECIDED,
         law=law,
         static_friction=static,
         static_interval=(0.0, max(limit, static)),
@@ -231,14 +192,14 @@ def valve_estimate(
 
 def output_model(
     record: Record, output: int, fit: ArxFit, stems: FloatArray, orders: ArxOrders
-) -> OutputModel:
+) -> identification.OutputModel:
     """Return one output's model with its one-step and its free-run fit."""
     y = record.pv[:, output]
     first, tail = orders.first, y[orders.first :]
     past, inputs = orders.of_output(output, len(stems))
     free_parameters = past + sum(inputs) + 1
     variance = fit.squared_error / max(len(tail) - free_parameters, 1)
-    return OutputModel(
+    return identification.OutputModel(
         name=record.outputs[output],
         a=tuple(map(float, fit.a[:past])),
         b={
@@ -251,3 +212,27 @@ def output_model(
         fit_one_step=nrmse_fit(tail, tail - fit.residuals),
         fit_free_run=nrmse_fit(tail, fit.free_run(y, stems, first)),
     )
+
+
+@dataclasses.dataclass(frozen=True)
+class EquationError:
+    """The criterion of one record with its stems, shape (m, N), %, and an ARX model per output."""
+
+    fits: tuple[ArxFit, ...]
+    stems: FloatArray
+
+    @property
+    def squared_error(self) -> float:
+        """Mean of SE over the outputs, (12a), squared engineering units."""
+        return float(np.mean([fit.squared_error for fit in self.fits]))
+
+
+def fit_outputs(
+    pv: FloatArray, stems: FloatArray, delays: Delays, orders: ArxOrders
+) -> EquationError:
+    """Fit every output: PV, shape (N, p), of stems, shape (m, N), %, with t_d of each valve."""
+    fits = tuple(
+        fit_arx(y, stems, row, orders, orders.kept(i, len(stems)))
+        for i, (y, row) in enumerate(zip(pv.T, delays, strict=True))
+    )
+    return EquationError(fits, stems)

@@ -19,36 +19,26 @@ InputOrders = int | tuple[int | tuple[int, ...], ...]
 class PaperOptions:
     """Options of :func:`stiction_ros.paper.methods.identify`.
 
-    Attributes:
-        method: ``nlp``, the nonlinear programme (12) at its best; ``nlp_printed``, the same to the
-            letter of the paper; or ``grid``.
-        output_order: n_a, or one for each output (8a); None takes 3.
-        input_order: n_b, or for each output one, or one for each valve (8b), (8c); None means
-            equal to n_a.
-        delay: inclusive range of t_d, samples, for every channel.
-        law: friction law, one with a smoothed form: ``he``, ``kano``, ``xch`` or
-            ``semi_physical`` with K = 1.99.
-        friction_limit: f_max, %, one for all valves or one for each; None is Δu, the span of
-            OP's sustained oscillation, found in the record.
-        starts: M, first guesses of the nonlinear programme for every choice of delays.
-        grid_step: step of f_S and of f_D, %.
-        grid_law: stem of the grid, ``smoothed`` as published or ``hard``.
-        check_columns: refuse a record in which OP and PV are clearly swapped.
-
     Raises:
         InputError: a value out of range.
     """
 
+    # ``nlp``, the nonlinear programme (12) at its best; ``nlp_printed``, the same to the letter of
+    # the paper; or ``grid``
     method: str = "nlp"
-    output_order: OutputOrders | None = None
-    input_order: InputOrders | None = None
-    delay: tuple[int, int] = (0, 10)
+    output_order: OutputOrders | None = None  # n_a, or one for each output (8a); None takes 3
+    input_order: InputOrders | None = None  # n_b, or by output, or by valve (8b), (8c); None is n_a
+    delay: tuple[int, int] = (0, 10)  # inclusive range of t_d, samples, for every channel
+    # friction law, one with a smoothed form: ``he``, ``kano``, ``xch`` or ``semi_physical`` with K
+    # = 1.99
     law: str = "he"
+    # f_max, %, one for all valves or one for each; None is Δu, the span of OP's sustained
+    # oscillation, found in the record
     friction_limit: float | tuple[float, ...] | None = None
-    starts: int = 7
-    grid_step: float = 0.5
-    grid_law: str = "smoothed"
-    check_columns: bool = True
+    starts: int = 7  # M, first guesses of the nonlinear programme for every choice of delays
+    grid_step: float = 0.5  # step of f_S and of f_D, %
+    grid_law: str = "smoothed"  # stem of the grid, ``smoothed`` as published or ``hard``
+    check_columns: bool = True  # refuse a record in which OP and PV are clearly swapped
 
     def __post_init__(self) -> None:
         for key, known in (("method", METHOD_NAMES), ("grid_law", GRID_LAWS)):
@@ -69,13 +59,7 @@ class PaperOptions:
 
     @classmethod
     def of(cls, options: IdentificationOptions, method: str, **chosen: object) -> PaperOptions:
-        """Return options of a method of the paper with the orders and delays of ``options``.
-
-        Args:
-            options: of an identification by the default search.
-            method: ``nlp``, ``nlp_printed`` or ``grid``.
-            chosen: other attributes of this class.
-        """
+        """Return options of a method of the paper with the orders and delays of ``options``."""
         shared = {
             key: getattr(options, key)
             for key in ("output_order", "input_order", "delay", "friction_limit", "check_columns")

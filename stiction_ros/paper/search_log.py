@@ -13,27 +13,16 @@ CAPPED = "Maximum_Iterations_Exceeded"
 
 @dataclasses.dataclass(frozen=True)
 class SolvedStart:
-    """One run of IPOPT from one start with one choice of delays.
+    """One run of IPOPT from one start with one choice of delays."""
 
-    Attributes:
-        kind: ``border``, ``ellipse``, ``inside``, ``restart`` or ``delay``.
-        delays: for each output the t_d of each valve, samples.
-        start: (f_S, f_D) per valve where it began, %.
-        end: (f_S, f_D) per valve where it ended, %.
-        objective: (12a) of the programme, squared engineering units.
-        status: IPOPT's own word.
-        iterations: of IPOPT.
-        feasible, stable: whether constraints hold and every A(q) is stable.
-    """
-
-    kind: str
-    delays: Delays
-    start: tuple[tuple[float, float], ...]
-    end: tuple[tuple[float, float], ...]
-    objective: float
-    status: str
-    iterations: int
-    feasible: bool
+    kind: str  # ``border``, ``ellipse``, ``inside``, ``restart`` or ``delay``
+    delays: Delays  # for each output the t_d of each valve, samples
+    start: tuple[tuple[float, float], ...]  # (f_S, f_D) per valve where it began, %
+    end: tuple[tuple[float, float], ...]  # (f_S, f_D) per valve where it ended, %
+    objective: float  # (12a) of the programme, squared engineering units
+    status: str  # IPOPT's own word
+    iterations: int  # of IPOPT
+    feasible: bool  # feasible, stable: whether constraints hold and every A(q) is stable
     stable: bool
 
     @property
@@ -48,26 +37,18 @@ class SolvedStart:
 
 @dataclasses.dataclass(frozen=True)
 class SearchLog:
-    """The answer of a method on the scale that all methods share, and the way to it.
+    """The answer of a method on the scale that all methods share, and the way to it."""
 
-    Attributes:
-        squared_error: (12a) of the answer's (f_S, f_D, delays) under He's hard law with
-            least-squares coefficients, squared engineering units.
-        objective: what the method itself minimised, same units.
-        output_order, input_order, first: n_a, n_b and ε of both.
-        points: grid points, or frictions at which the programme evaluated (12a).
-        delays_tried: number of choices of delays.
-        starts: every start of the nonlinear programme, in order; empty for the others.
-    """
-
+    # (12a) of the answer's (f_S, f_D, delays) under He's hard law with least-squares coefficients,
+    # squared engineering units
     squared_error: float
-    objective: float
-    output_order: int
+    objective: float  # what the method itself minimised, same units
+    output_order: int  # output_order, input_order, first: n_a, n_b and ε of both
     input_order: int
     first: int
-    points: int
-    delays_tried: int
-    starts: tuple[SolvedStart, ...] = ()
+    points: int  # grid points, or frictions at which the programme evaluated (12a)
+    delays_tried: int  # number of choices of delays
+    starts: tuple[SolvedStart, ...] = ()  # starts of the nonlinear programme, in order
 
     @property
     def solves(self) -> int:
@@ -86,13 +67,9 @@ class SearchLog:
 
 @dataclasses.dataclass(frozen=True, repr=False, kw_only=True)
 class PaperIdentification(Identification):
-    """What one of the paper's methods makes of a record.
+    """What one of the paper's methods makes of a record."""
 
-    Attributes:
-        search: what the method tried and its squared error.
-    """
-
-    search: SearchLog
+    search: SearchLog  # what the method tried and its squared error
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json`` but for ``record``."""

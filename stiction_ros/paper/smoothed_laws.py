@@ -1,12 +1,8 @@
 r"""Friction laws that the paper's methods take: hard, and with switches of hyperbolic tangents.
 
-A smoothed law is one function of the last state, OP and the frictions,
-
 .. math:: s_k = F(s_{k-1}, u_k, u_{k-1}, f_S, f_D; \tau)
 
-whose first entry is the stem. He's has no other entry; Kano's carries the direction of motion,
-0 at rest. The reconstruction of XCH has the signature of Kano's, so its smoothed form is the same.
-Choudhury's has none: its threshold depends on why the stem stuck.
+The first entry is the stem; Kano's law and XCH's carry the direction of motion besides, 0 at rest.
 """
 
 from __future__ import annotations
@@ -19,12 +15,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.effects import (
-    HeStiction,
-    KanoStiction,
-    SemiPhysicalStiction,
-    XchStiction,
-)
+from stiction_ros.effects import HeStiction, KanoStiction, SemiPhysicalStiction, XchStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.friction.he_smoothed import smoothed_step
 from stiction_ros.effects.friction.kano_smoothed import REST, kano_step
@@ -39,31 +30,18 @@ Step = Callable[[Sequence[Any], tuple[Any, Any], tuple[Any, Any], Any, Any], lis
 
 @dataclasses.dataclass(frozen=True)
 class SmoothLaw:
-    """One law in both forms.
+    """One law in both forms."""
 
-    Attributes:
-        name: of the hard law.
-        kind: its class.
-        states: entries of the state of the smoothed law.
-        simulated: stem, shape (N,), %, of OP (N,), f_S, f_D, % and τ, 1/%; from rest at the
-            first OP.
-        step: state, (u_k, u_{k−1}), (f_S, f_D), τ and tanh → next state; numbers or CasADi.
-    """
-
-    name: str
-    kind: Any
-    states: int
-    simulated: Simulated
-    step: Step
+    name: str  # of the hard law
+    kind: Any  # its class
+    states: int  # entries of the state of the smoothed law
+    simulated: Simulated  # stem, (N,), %, of OP (N,), f_S, f_D, % and τ, 1/%; from rest at OP
+    step: Step  # state, (u_k, u_{k−1}), (f_S, f_D), τ and tanh → next state; numbers or CasADi
 
     def stems(self, op: FloatArray, friction: FloatArray, smoothing: FloatArray) -> FloatArray:
-        """Return smoothed stems, shape (m, N), %.
+        """Return smoothed stems, shape (m, N), %, of OP, shape (N, m), %.
 
-        Args:
-            op: shape (N, m), %.
-            friction: rows (f_S, f_D), shape (m, 2), %; negative ones count as 0, f_S below f_D
-                as f_D.
-            smoothing: τ of every valve, shape (m,), 1/%.
+        Negative frictions, rows (f_S, f_D), shape (m, 2), %, count as 0, f_S below f_D as f_D.
         """
         made = np.empty(op.T.shape)
         for j, (static, dynamic) in enumerate(friction.tolist()):
@@ -97,11 +75,7 @@ def smooth_law(name: str) -> SmoothLaw:
 
 
 def final_smoothing(limits: FloatArray) -> FloatArray:
-    """Return τ at which (5) equals (4), shape (m,), 1/%: 10⁴, more where OP spans below 10 %.
-
-    Args:
-        limits: f_max of every valve, shape (m,), %.
-    """
+    """Return τ at which (5) equals (4), shape (m,), 1/%: 10⁴, more where OP spans below 10 %."""
     return np.maximum(SMOOTHING, 10.0 * SMOOTHING / np.maximum(limits, 1e-9))
 
 

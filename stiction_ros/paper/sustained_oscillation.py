@@ -1,14 +1,7 @@
-"""Δu: the span of the sustained oscillation of OP, to which the paper limits friction.
+"""Δu: the span of the sustained oscillation of OP, to which Section 3.2 limits friction.
 
-Section 3.2 takes f_max = Δu, "the span of sustained oscillation of the corresponding controller
-output"; the grid of Example 2 takes the maximum periodic oscillation. A set-point move throws OP
-much farther than the cycle does, so the span of a whole record is no Δu.
-
-A record is cut where a set-point moves. Of each hold the second half counts, in which OP has
-settled into its cycle, or the cycle has stopped. Δu is the largest span of these halves that
-another hold reaches by half: a span that comes once is a transient. A record without a
-set-point move is cut into eight equal parts, each taken whole. Where nothing repeats, OP has no
-sustained oscillation and its span over the record stands in.
+A record is cut where a set-point moves, else into eight parts. Of each hold the second half counts.
+Δu is the largest span that another one reaches by half: what comes once is a transient.
 """
 
 from __future__ import annotations
@@ -31,23 +24,14 @@ MIN_SAMPLES = 4  # of a part that is looked at
 
 @dataclasses.dataclass(frozen=True)
 class SustainedOscillation:
-    """Δu of one valve and what speaks for it.
+    """Δu of one valve and what speaks for it."""
 
-    Attributes:
-        valve: tag.
-        span: Δu, %.
-        sustained: whether another part repeats it; False where the span of OP stands in.
-        whole: span of OP over the record, %.
-        parts: first row and one past the last of every part looked at.
-        spans: of OP in each part, %.
-    """
-
-    valve: str
-    span: float
-    sustained: bool
-    whole: float
-    parts: tuple[tuple[int, int], ...]
-    spans: tuple[float, ...]
+    valve: str  # tag
+    span: float  # Δu, %
+    sustained: bool  # whether another part repeats it; False where the span of OP stands in
+    whole: float  # span of OP over the record, %
+    parts: tuple[tuple[int, int], ...]  # first row and one past the last of every part looked at
+    spans: tuple[float, ...]  # of OP in each part, %
 
     @property
     def alike(self) -> int:

@@ -11,7 +11,7 @@ from stiction_ros.processes.process import Process
 
 
 class AlteredProcess(Process):
-    r"""Another process with effects on its outputs, in deviations from its operating point.
+    r"""The process ``inner`` with ``effects`` on its outputs, about its operating point.
 
     .. math::
         y_k &= y_0 + C z_k + D (x_k - y_0) \\
@@ -19,23 +19,14 @@ class AlteredProcess(Process):
 
     with x the output of the process as it was. The effects come before disturbances, noise
     and sensors. For a linear process it is the same whether they act on the output or on all
-    inputs of that output's equation; noise that enters the equation passes them as well.
-
-    The state is that of the process and then z.
-
-    Attributes:
-        inner: the process without the effects.
-        effects: per output, in signal order.
+    inputs of that output's equation; noise that enters the equation passes them, too. The state is
+    that of the process and then z.
     """
 
     def __init__(
         self, inner: Process, effects: tuple[tuple[Behaviour, ...], ...], sample_time: float
     ) -> None:
-        """Put ``effects``, one tuple per output, behind ``inner``.
-
-        Raises:
-            InputError: an effect that is not linear, or not one tuple per output.
-        """
+        """Put ``effects``, one tuple of linear ones per output, behind ``inner``."""
         if len(effects) != len(inner.outputs):
             raise InputError(f"{len(effects)} lists of effects for {len(inner.outputs)} outputs")
         self.inner, self.effects = inner, effects
@@ -103,10 +94,7 @@ def _filter(effect: Behaviour, sample_time: float) -> Filter:
 
 
 def _at_rest(entry: Filter, out: float) -> tuple[FloatArray, float]:
-    """Return the state and the input at which the filter rests at ``out``.
-
-    What has no gain at rest, a leak, starts without memory and ``out`` as its input.
-    """
+    """Return the state and the input at which the filter rests at ``out``."""
     n = len(entry.b)
     shape = np.linalg.lstsq(np.eye(n) - entry.a, entry.b, rcond=None)[0]
     gain = entry.d + float(entry.c @ shape)

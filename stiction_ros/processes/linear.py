@@ -20,22 +20,16 @@ class LinearModel:
         \xi_{k+1} &= A \xi_k + B (\chi_k - \chi_0) + E w_k + g \\
         y_k &= C \xi_k + y_0
 
-    Attributes:
-        a, b, c: shapes (n, n), (n, m), (p, n).
-        e: shape (n, d), effect of measured disturbances in deviations; d may be 0.
-        constant: g, shape (n,), the bias of an ARX equation.
-        stem0, pv0: the operating point χ₀ (m,) in % and y₀ (p,) in engineering units.
-
     Raises:
         InputError: shapes that do not fit together, or values that are not finite.
     """
 
-    a: FloatArray
+    a: FloatArray  # a, b, c: shapes (n, n), (n, m), (p, n)
     b: FloatArray
     c: FloatArray
-    e: FloatArray
-    constant: FloatArray
-    stem0: FloatArray
+    e: FloatArray  # shape (n, d), effect of measured disturbances in deviations; d may be 0
+    constant: FloatArray  # g, shape (n,), the bias of an ARX equation
+    stem0: FloatArray  # stem0, pv0: the operating point χ₀ (m,) in %, y₀ (p,) in units of PV
     pv0: FloatArray
 
     def __post_init__(self) -> None:
@@ -72,12 +66,5 @@ class LinearModel:
             return np.full((len(self.pv0), len(self.stem0)), np.inf)
 
     def step_responses(self, samples: int) -> FloatArray:
-        """Return the responses of outputs to stem steps of 1 % at sample 0, without ``constant``.
-
-        Args:
-            samples: N.
-
-        Returns:
-            Shape (N, p, m), engineering units.
-        """
+        """Return responses, (N, p, m), to stem steps of 1 % at sample 0, without ``constant``."""
         return responses(self.a, self.c, itertools.repeat(self.b, samples))

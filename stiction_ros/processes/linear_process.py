@@ -45,23 +45,14 @@ class LinearProcess(Process):
 
 @dataclasses.dataclass(frozen=True)
 class ArxOutput:
-    """One output's difference equation (7)-(9).
+    """One output's difference equation (7)-(9)."""
 
-    Attributes:
-        name: tag of the output.
-        a: a₁ … a_na, sign as in (8a).
-        b: per valve b₁ … b_nb.
-        delay: per valve t_d in samples; χ enters at k − 1 − t_d.
-        bias: constant on the right-hand side, units of the output.
-        noise: v of (9), or noise added to the measurement.
-    """
-
-    name: str
-    a: tuple[float, ...]
-    b: Mapping[str, tuple[float, ...]]
-    delay: Mapping[str, int]
-    bias: float = 0.0
-    noise: Noise = Noise()
+    name: str  # tag of the output
+    a: tuple[float, ...]  # a₁ … a_na, sign as in (8a)
+    b: Mapping[str, tuple[float, ...]]  # per valve b₁ … b_nb
+    delay: Mapping[str, int]  # per valve t_d in samples; χ enters at k − 1 − t_d
+    bias: float = 0.0  # constant on the right-hand side, units of the output
+    noise: Noise = Noise()  # v of (9), or noise added to the measurement
 
     def __post_init__(self) -> None:
         if set(self.b) != set(self.delay):

@@ -28,22 +28,14 @@ class Noise:
 
 
 class Process(ABC):
-    """A process with m valves, p outputs and d further inputs that nobody manipulates.
-
-    Attributes:
-        valves: names of the manipulated inputs, stem positions in %.
-        outputs: names of the outputs.
-        noise: one :class:`Noise` per output.
-        upsets: names of the further inputs (disturbances), measured or not.
-        measured_disturbances: those of ``upsets`` that are measured.
-    """
+    """A process with m valves, p outputs and d further inputs that nobody manipulates."""
 
     kind: str
-    valves: tuple[str, ...]
-    outputs: tuple[str, ...]
-    noise: tuple[Noise, ...]
-    upsets: tuple[str, ...] = ()
-    measured_disturbances: tuple[str, ...] = ()
+    valves: tuple[str, ...]  # names of the manipulated inputs, stem positions in %
+    outputs: tuple[str, ...]  # names of the outputs
+    noise: tuple[Noise, ...]  # one ``Noise`` per output
+    upsets: tuple[str, ...] = ()  # names of the further inputs (disturbances), measured or not
+    measured_disturbances: tuple[str, ...] = ()  # those of ``upsets`` that are measured
 
     @abstractmethod
     def rest(self, stem: FloatArray, pv: FloatArray) -> FloatArray:

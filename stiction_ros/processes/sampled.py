@@ -11,23 +11,15 @@ from numpy.typing import ArrayLike
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 
-WHOLE = 1e-9
-"""Samples by which a dead time may be off a whole number of them and counts as that."""
-
-Channel = tuple[FloatArray, FloatArray, int]
-"""How one PV answers one valve: b₁ …, a₀ = 1, a₁ … and the delay in samples."""
+WHOLE = 1e-9  # samples by which a dead time may be off a whole number of them and counts as that
+Channel = tuple[FloatArray, FloatArray, int]  # b₁ …, a₀ = 1, a₁ … and the delay in samples
 
 
 def held(num: ArrayLike, den: ArrayLike, dead_time: float, sample_time: float) -> Channel:
     """Return a continuous transfer function at its samples, the stem held between them.
 
-    Args:
-        num, den: coefficients, the highest power of s first, time in s.
-        dead_time: s, 0 up; it need be no whole number of samples.
-        sample_time: s.
-
-    Raises:
-        InputError: PV would answer at once.
+    ``num`` and ``den`` begin with the highest power of s; the dead time, s, need be no whole
+    number of samples. A PV that would answer at once is refused.
     """
     above, below = (np.trim_zeros(np.array(each, dtype=float), "f") for each in (num, den))
     n = len(below) - 1

@@ -54,11 +54,7 @@ class StirredTank(Process):
         sample_time: float = 60.0,
         measured_disturbances: tuple[str, ...] = (),
     ) -> None:
-        """Build a tank stepped by ``sample_time`` seconds.
-
-        Raises:
-            InputError: other than two valves and two outputs, or an unknown disturbance.
-        """
+        """Build a tank stepped by ``sample_time`` seconds."""
         if len(valves) != 2 or len(outputs) != 2:
             raise InputError("a stirred tank has two valves and two outputs", where="process")
         for name in measured_disturbances:

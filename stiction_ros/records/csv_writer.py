@@ -5,23 +5,24 @@ from __future__ import annotations
 import csv
 import datetime
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError, storing
-from stiction_ros.records.csv_names import (
-    DEFAULT_OUTPUT,
-    DEFAULT_VALVE,
-    MODE,
-    QUALITY,
-    SIGNALS,
-    column_name,
-)
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
+
+DEFAULT_VALVE = "V1"
+DEFAULT_OUTPUT = "PV1"
+SIGNALS = {"op": "OP", "pv": "PV", "sp": "SP", "stem": "STEM"}
+"""Signal of a record to the last part of its columns' names, in the order of the file."""
+
+QUALITY = "QUALITY"  # column with the quality of each sample, written where not all are good
+MODE = "MODE"  # column with the mode of the loop's controller, before that of the quality
+_KEYS = {name: key for key, name in SIGNALS.items()}
 
 
 def write_csv(
@@ -58,7 +59,10 @@ def write_csv(
             where=record.name,
             fix="write each of its segments by itself",
         )
-    plain = (record.valves, record.outputs) == ((DEFAULT_VALVE,), (DEFAULT_OUTPUT,))
+    plain = (record.valves, record.outputs) == (
+        (DEFAULT_VALVE,),
+        (DEFAULT_OUTPUT,),
+    )
     times = _iso(record) if iso else [repr(t) for t in (record.start + record.time).tolist()]
     header, columns = ["t"], [times]
     for key, name in SIGNALS.items():
@@ -68,7 +72,7 @@ def write_csv(
         tags = record.valves if key in ("op", "stem") else record.outputs
         for tag, column in zip(tags, values.T, strict=True):
             header.append(name if plain else column_name(key, tag))
-            columns.append([_cell(value) for value in column.tolist()])
+            columns.append(["" if math.isnan(x) else repr(x) for x in column.tolist()])
     if modes is not None:
         header.append(MODE)
         columns.append(list(modes))
@@ -83,10 +87,6 @@ def write_csv(
         writer.writerows(zip(*columns, strict=True))
 
 
-def _cell(value: float) -> str:
-    return "" if math.isnan(value) else repr(value)
-
-
 def _iso(record: Record) -> list[str]:
     try:
         begin = datetime.datetime.fromtimestamp(record.start, datetime.UTC)
@@ -96,3 +96,29 @@ def _iso(record: Record) -> list[str]:
             f"{record.start:.9g} s is no date", where=record.name, fix="write seconds"
         ) from None
     return [stamp.isoformat().replace("+00:00", "Z") for stamp in stamps]
+
+
+def column_name(key: str, tag: str) -> str:
+    """Return ``TAG.OP``, ``TAG.PV``, ``TAG.SP`` or ``TAG.STEM``."""
+    return f"{tag}.{SIGNALS[key]}"
+
+
+def tagged_columns(header: Sequence[str]) -> Mapping[str, Mapping[str, str]]:
+    """Return signal to tag to column of a ``header`` that ``write_csv`` wrote; empty for others.
+
+    It is the time, OP of every valve, PV of every output and, where they are known, SP of the
+    same outputs and the stems of the same valves, each in the same order, and perhaps mode and
+    quality.
+    """
+    found: dict[str, dict[str, str]] = {key: {} for key in SIGNALS}
+    for last in (QUALITY, MODE):
+        header = header[:-1] if header and header[-1] == last else header
+    for column in header[1:]:
+        tag, _, name = column.rpartition(".")
+        if not tag or name not in _KEYS:
+            return {}
+        found[_KEYS[name]][tag] = column
+    op, pv, sp, stem = (list(found[key]) for key in SIGNALS)
+    written = [column_name(key, tag) for key, tags in found.items() for tag in tags]
+    whole = op and pv and sp in ([], pv) and stem in ([], op)
+    return found if whole and written == list(header[1:]) else {}

@@ -12,19 +12,12 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Gap, Record
 
-DATES = 3e8
-"""Seconds from which a time is shown as a date: 1979."""
-
-ALIKE = 0.01
-"""Sample times of two parts, one over the other, that count as the same."""
+DATES = 3e8  # seconds from which a time is shown as a date: 1979
+ALIKE = 0.01  # sample times of two parts, one over the other, that count as the same
 
 
 def only_part(parts: Sequence[Record], where: str) -> Record:
-    """Return the one part that there is, with every sample usable.
-
-    Raises:
-        InputError: there are several, or samples that are bad.
-    """
+    """Return the one part that there is; InputError for several, or for bad samples."""
     convert = f"stiction convert writes its {len(parts)} parts as records of their own"
     if len(parts) > 1:
         before, after = parts[0], parts[1]
@@ -48,14 +41,7 @@ def only_part(parts: Sequence[Record], where: str) -> Record:
 
 
 def longest_part(parts: Sequence[Record]) -> Record:
-    """Return the longest stretch of good samples, its notes saying which it is.
-
-    Args:
-        parts: of one source, in their order, one at least.
-
-    Raises:
-        InputError: no good samples.
-    """
+    """Return the longest stretch of good samples, noting which it is; InputError without any."""
     good = [part for each in parts for part in each.good_parts()]
     if not good:
         raise InputError("has no good samples", where=parts[0].name)
@@ -79,13 +65,10 @@ def span(*parts: Record) -> str:
 
 
 def joined(parts: Sequence[Record]) -> Record:
-    """Return the parts as one record with gaps between them.
+    """Return the parts of one source, one at least, as one record with gaps between them.
 
     It has the sample time of the longest part; parts with another one, and signals that are
     not in every part, are left out with a note.
-
-    Args:
-        parts: of one source, in their order, one at least.
     """
     if len(parts) == 1:
         return parts[0]

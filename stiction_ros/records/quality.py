@@ -12,14 +12,11 @@ QualityArray = np.ndarray[tuple[int], np.dtype[np.uint8]]
 class Quality(enum.IntEnum):
     """What is known of one sample, as one byte of a record's mask."""
 
-    GOOD = 0
-    """Measured."""
+    GOOD = 0  # measured
     HELD = 1
     """Missing in the source; carried over from its neighbours, or interpolated between them."""
-    BAD = 2
-    """Not to be used; its values may be NaN."""
-    MANUAL = 3
-    """Measured, but the loop was not in automatic."""
+    BAD = 2  # not to be used; its values may be NaN
+    MANUAL = 3  # measured, but the loop was not in automatic
 
     @property
     def word(self) -> str:
@@ -27,8 +24,5 @@ class Quality(enum.IntEnum):
         return self.name.lower()
 
 
-QUALITY_WORDS = {quality.word: quality for quality in Quality}
-"""Word in files to quality."""
-
-USABLE = (Quality.GOOD, Quality.HELD)
-"""What identification works on."""
+QUALITY_WORDS = {quality.word: quality for quality in Quality}  # word in files to quality
+USABLE = (Quality.GOOD, Quality.HELD)  # what identification works on

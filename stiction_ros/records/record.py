@@ -19,28 +19,18 @@ IndexArray = np.ndarray[tuple[int], np.dtype[np.intp]]
 
 
 class Gap(NamedTuple):
-    """Where a record goes on after a gap, or where another run begins.
+    """Where a record goes on after a gap, or where another run begins."""
 
-    Attributes:
-        row: first sample behind it.
-        start: time of that sample on the record's own clock, s.
-    """
-
-    row: int
-    start: float
+    row: int  # first sample behind it
+    start: float  # time of that sample on the record's own clock, s
 
 
 class Segment(NamedTuple):
-    """A stretch of samples without a gap.
+    """A stretch of samples without a gap."""
 
-    Attributes:
-        first, last: its samples, ``last`` not included.
-        start: time of the first on the record's own clock, s.
-    """
-
-    first: int
+    first: int  # first, last: its samples, ``last`` not included
     last: int
-    start: float
+    start: float  # time of the first on the record's own clock, s
 
 
 @dataclasses.dataclass(frozen=True)
@@ -317,10 +307,7 @@ class Record:
         """Return for each sample its row in :meth:`filled`, shape (N,)."""
         rows = np.arange(len(self))
         for before, after in itertools.pairwise(self.segments):
-            rows[after.first :] += min(max(self._missing(before, after), 1), len(self))
+            end = before.start + (before.last - before.first) * self.sample_time
+            missing = round((after.start - end) / self.sample_time)  # below 0 when time falls
+            rows[after.first :] += min(max(missing, 1), len(self))
         return rows
-
-    def _missing(self, before: Segment, after: Segment) -> int:
-        """Return how many samples are missing between two segments; below 0 when time falls."""
-        end = before.start + (before.last - before.first) * self.sample_time
-        return round((after.start - end) / self.sample_time)

@@ -1,68 +1,47 @@
 """Makes a regular record of samples that are slightly irregular, and says what it did.
 
-A row is a sample: its values stay together and are never mixed with those of its neighbours.
-Each row gets a place, an integer; only places without a row are filled.
+A row is a sample with a place, an integer; only places without a row are filled.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
+from stiction_ros.errors import InputError
 from stiction_ros.records.quality import Quality, QualityArray
-from stiction_ros.records.sampling import TOLERATED, shortest
 
-GAP = 5.5
-"""A step of more usual steps than this is a gap: the record is split there."""
+GAP = 5.5  # a step of more usual steps than this is a gap: the record is split there
 
 SLIGHT = 0.1
 """Share of the places that may be without a row, and the mean square by which steps may stray
 from their mean, over that mean: rows missing at random make the one as large as the other."""
 
-HOLE = 1.5
-"""A step of more usual steps than this is a hole in which samples are missing."""
-
-CAUGHT_UP = 0.25
-"""Steps by which rows may still be late when the delay of one of them is over: half of what a
-row may be off its place."""
-
-SHORTEST = 3
-"""Samples that a repair needs at least."""
-
-FEWEST_STAMPS = 5
-"""Stamps from which on it can be told that they are cut off."""
-
-DIFFERENT = 0.5
-"""Share of rows with a stamp that was there already in which OP or PV must differ, for the same."""
-
-BY_CHANCE = 1e-3
-"""Chance with which rows lost at random may pass for stamps with too few digits."""
-
-WHOLE = 1e-3
-"""Share of the smallest step by which others are off its multiples in rounded stamps, at most."""
+HOLE = 1.5  # a step of more usual steps than this is a hole in which samples are missing
+CAUGHT_UP = 0.25  # steps by which rows may still be late when a delay is over: half of the most
+SHORTEST = 3  # samples that a repair needs at least
+FEWEST_STAMPS = 5  # stamps from which on it can be told that they are cut off
+DIFFERENT = 0.5  # share of rows with a stamp of before in which OP or PV must differ
+BY_CHANCE = 1e-3  # chance with which rows lost at random may pass for stamps with too few digits
+WHOLE = 1e-3  # share of the smallest step by which others may be off its multiples
+SILENT = 1e-4  # jitter, as a share of the sample time, that is rounding and not worth a word
+TOLERATED = 0.1  # jitter, as a share of the sample time, that is taken as regular with a note
 
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """One stretch of samples without a gap.
+    """One stretch of samples without a gap."""
 
-    Attributes:
-        first, last: rows of the file that it is made of, ``last`` not included.
-        time: regular times, shape (N,), s; the given ones where nothing was repaired.
-        place: of each row among the times, increasing, shape (rows,).
-        note: what was done; empty for nothing.
-    """
-
-    first: int
+    first: int  # first, last: rows of the file that it is made of, ``last`` not included
     last: int
-    time: FloatArray
-    place: IntArray
-    note: str = ""
+    time: FloatArray  # regular times, shape (N,), s; the given ones where nothing was repaired
+    place: IntArray  # of each row among the times, increasing, shape (rows,)
+    note: str = ""  # what was done; empty for nothing
 
     @property
     def missing(self) -> NDArray[np.bool_]:
@@ -107,11 +86,7 @@ class Part:
 
 
 def split_at_gaps(time: FloatArray) -> list[tuple[int, int]]:
-    """Return first and last (not included) row of each stretch without a gap.
-
-    Args:
-        time: increasing times, shape (N,), s.
-    """
+    """Return first and last (not included) row of each stretch of increasing times without gap."""
     steps = np.diff(time)
     cuts = np.flatnonzero(steps > GAP * float(np.median(steps))) + 1
     edges = [0, *cuts.tolist(), len(time)]
@@ -119,15 +94,11 @@ def split_at_gaps(time: FloatArray) -> list[tuple[int, int]]:
 
 
 def regular_part(time: FloatArray, first: int, last: int) -> Part:
-    """Return rows ``first`` up to ``last`` on a regular grid.
+    """Return rows ``first`` up to ``last`` of increasing times, (rows,), s, on a regular grid.
 
     The sample time is the time from the first row to the last over the places between them.
     Rows are taken as they are when their steps differ by a tenth at most, and when more than a
     tenth of the places would be without a row, or steps stray as much as that makes them.
-
-    Args:
-        time: increasing times of all rows, shape (rows,), s.
-        first, last: the stretch, without a gap inside.
     """
     given = time[first:last]
     plain = Part(first, last, given, np.arange(len(given)))
@@ -170,12 +141,7 @@ def spread_evenly(
 
     Then every stamp has as many rows but for one, stamps follow each other evenly, and what stands
     in the rows differs; where a stamp has one row, those with two come evenly. None for rows that
-    are there twice.
-
-    Args:
-        time: never falling, shape (rows,), s.
-        first: first row of each stamp.
-        values: of each signal, shape (rows,).
+    are there twice. The ``first`` rows are those at which stamps begin; times, s, never fall.
     """
     if len(first) < FEWEST_STAMPS:
         return None
@@ -203,10 +169,7 @@ def spread_evenly(
 
 
 def _evenly(rows: IntArray) -> NDArray[np.bool_]:
-    """Return which distances of rows are the usual one, or one row off it, shape (R - 1,).
-
-    Halves that are rounded to even make them differ in turn, so two are looked at together.
-    """
+    """Return which distances of rows are the usual one, or one row off it, shape (R - 1,)."""
     if len(rows) < 3:
         return np.zeros(max(len(rows) - 1, 0), dtype=np.bool_)
     usual = float(np.median(rows[2:] - rows[:-2])) / 2.0
@@ -214,19 +177,13 @@ def _evenly(rows: IntArray) -> NDArray[np.bool_]:
 
 
 def _chance_of_even(apart: float) -> float:
-    """Return the chance that a distance of rows lost at random is one row off the usual at most.
-
-    Such distances are geometric.
-    """
+    """Return the chance that a distance of rows lost at random is one row off the usual at most."""
     kept = 1.0 - 1.0 / apart
     return float(kept ** max(np.ceil(apart - 1.0) - 1.0, 0.0) - kept ** np.floor(apart + 1.0))
 
 
 def _of_late(steps: FloatArray) -> IntArray:
-    """Return how many places each step takes, shape (rows - 1,): one for all but holes.
-
-    A step of n places is one of a late row when the n - 1 steps before or after make up for it.
-    """
+    """Return how many places each step takes, shape (rows - 1,): one for all but holes."""
     elapsed = float(steps.sum())
     counts = np.ones(len(steps), dtype=np.int64)
     seen: set[int] = set()
@@ -243,12 +200,7 @@ def _of_late(steps: FloatArray) -> IntArray:
 
 
 def _of_rounded(given: FloatArray) -> IntArray | None:
-    """Return how many places each step takes where the stamps have too few digits, or None.
-
-    Then steps are multiples of the last digit, and those of two come evenly: one more each time
-    that the scan has run ahead of the digits. Missing rows do not come evenly. A step takes the
-    fewest places with which all stamps so far are within half a digit of regular times.
-    """
+    """Return how many places each step takes where the stamps have too few digits, or None."""
     steps = np.diff(given)
     turns = steps / float(steps.min())
     whole = np.rint(turns)
@@ -276,3 +228,58 @@ def _of_rounded(given: FloatArray) -> IntArray | None:
             low, high = behind - 0.5, behind + 0.5
         low, high = max(low, behind - 0.5), min(high, behind + 0.5)
     return counts
+
+
+def sample_time(
+    time: FloatArray, where: str, place: Callable[[int], str]
+) -> tuple[float, tuple[str, ...]]:
+    """Return the seconds between two samples, and one note when the jitter is more than rounding.
+
+    Args:
+        time: times of the N samples in s, shape (N,).
+        where: file or bag, for errors.
+        place: names a sample for errors, ``place(3)`` → ``line 5``.
+
+    Raises:
+        InputError: fewer than two samples, time that does not increase, a gap.
+    """
+    if len(time) < 2:
+        raise InputError(
+            f"has {len(time)} sample{'s' * (len(time) != 1)}",
+            where=where,
+            fix="a record needs two at least",
+        )
+    steps = np.diff(time)
+    if not (steps > 0).all():
+        row = int(np.argmin(steps > 0)) + 1
+        raise InputError(
+            f"time does not increase at {place(row)} ({time[row - 1]:.9g}, then {time[row]:.9g} s)",
+            where=where,
+            fix="sort the rows and remove those that are there twice",
+        )
+    usual = float(np.median(steps))
+    jitter = np.abs(steps - usual) / usual
+    worst = int(np.argmax(jitter))
+    if jitter[worst] > TOLERATED:
+        row = int(np.argmax(jitter > TOLERATED)) + 1
+        raise InputError(
+            f"time is irregular at {place(row)}: {steps[row - 1]:.6g} s after the sample before, "
+            f"elsewhere {usual:.6g} s",
+            where=where,
+            fix="cut the record there or resample it",
+        )
+    step = shortest(time[0], time[-1], len(steps), max(float(jitter[worst]), 1e-5))
+    if jitter[worst] <= SILENT:
+        return step, ()
+    note = f"sample times jitter by up to {100 * jitter[worst]:.2g} %, taken as regular"
+    return step, (note,)
+
+
+def shortest(first: float, last: float, steps: int, tolerance: float) -> float:
+    """Return the shortest decimal, s, that is the step from one time to another in ``steps``."""
+    mean = float(last - first) / steps
+    for digits in range(1, 15):
+        short = float(f"{mean:.{digits}g}")
+        if abs(short - mean) * steps <= tolerance * mean:
+            return short
+    return mean

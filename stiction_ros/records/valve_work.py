@@ -11,18 +11,12 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 
-STANDS = 1e-9
-"""Share of the stem's range up to which a move is rounding."""
+STANDS = 1e-9  # share of the stem's range up to which a move is rounding
 
 
 @dataclasses.dataclass(frozen=True)
 class ValveWork:
     """The work of one valve over a stretch of time, or per hour.
-
-    Attributes:
-        travel: Σ|Δχ|, %.
-        moves: samples at which the stem moves.
-        reversals: moves in the other direction than the one before.
 
     Examples:
         >>> import numpy as np
@@ -30,9 +24,9 @@ class ValveWork:
         ValveWork(travel=16.0, moves=2.0, reversals=1.0)
     """
 
-    travel: float
-    moves: float
-    reversals: float
+    travel: float  # Σ|Δχ|, %
+    moves: float  # samples at which the stem moves
+    reversals: float  # moves in the other direction than the one before
 
     @classmethod
     def of(cls, stem: FloatArray) -> ValveWork:

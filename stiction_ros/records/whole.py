@@ -12,59 +12,38 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.quality import QualityArray
 from stiction_ros.records.record import Record
-from stiction_ros.records.regular import HOLE, Part, regular_part, split_at_gaps
-from stiction_ros.records.sampling import sample_time
+from stiction_ros.records.regular import HOLE, Part, regular_part, sample_time, split_at_gaps
 
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """How errors and records name a source.
+    """How errors and records name a source."""
 
-    Attributes:
-        name: of its records.
-        where: file or bag, for errors.
-        place: names a row for errors, ``place(3)`` → ``line 5``.
-        cut_holes: whether a stretch with too many holes is cut at them, not refused.
-    """
-
-    name: str
-    where: str
-    place: Callable[[int], str]
-    cut_holes: bool = False
+    name: str  # of its records
+    where: str  # file or bag, for errors
+    place: Callable[[int], str]  # names a row for errors, ``place(3)`` → ``line 5``
+    cut_holes: bool = False  # whether a stretch with too many holes is cut at them, not refused
 
 
 @dataclasses.dataclass(frozen=True)
 class Whole:
-    """Samples of a loop on one clock, as they were given.
+    """Samples of a loop on one clock, as they were given."""
 
-    Attributes:
-        valves, outputs: tags.
-        time: increasing, shape (rows,), s since the first.
-        start: time of the first on the source's own clock, s.
-        op, stem: shape (rows, m); stem None when not known.
-        pv, sp: shape (rows, p); sp None when not known.
-        mask: quality of each row, shape (rows,); None when all are good.
-    """
-
-    valves: tuple[str, ...]
+    valves: tuple[str, ...]  # valves, outputs: tags
     outputs: tuple[str, ...]
-    time: FloatArray
-    start: float
-    op: FloatArray
-    pv: FloatArray
+    time: FloatArray  # increasing, shape (rows,), s since the first
+    start: float  # time of the first on the source's own clock, s
+    op: FloatArray  # op, stem: shape (rows, m); stem None when not known
+    pv: FloatArray  # pv, sp: shape (rows, p); sp None when not known
     sp: FloatArray | None
     stem: FloatArray | None
-    mask: QualityArray | None = None
+    mask: QualityArray | None = None  # quality of each row, shape (rows,); None when all are good
 
     def records(self, source: Source, notes: Sequence[str] = ()) -> tuple[Record, ...]:
-        """Return one record for each stretch without a gap.
+        """Return one record for each stretch without a gap, with ``notes`` before its own.
 
         A step of more than 5.5 usual ones is a gap. Each row is a sample, also
         where its stamp is slightly off; short holes are held, and the mask says where.
-
-        Args:
-            source: of the samples.
-            notes: to put before those of every record.
 
         Raises:
             InputError: fewer than two rows, or samples that are irregular.

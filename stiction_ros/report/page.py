@@ -9,19 +9,11 @@ from pathlib import Path
 from stiction_ros.pages import frame
 from stiction_ros.pages.frame import SCROLLED, text, words
 
-Cell = str | tuple[str, str]
-"""Text of a table cell, or its class and its text."""
+Cell = str | tuple[str, str]  # text of a table cell, or its class and its text
 
 
 def page_file(out: str | Path) -> tuple[Path, Path | None]:
-    """Return the file of a page, and the folder for what stands beside it.
-
-    Args:
-        out: a folder, or an ``.html`` file that stands alone; folders are made.
-
-    Returns:
-        The file, and the folder; None for a page that stands alone.
-    """
+    """Return the file of a page, and its folder, made where need be; None for a lone ``.html``."""
     out = Path(out)
     alone = out.suffix.lower() == ".html"
     folder = out.parent if alone else out

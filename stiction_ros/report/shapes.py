@@ -23,14 +23,7 @@ from stiction_ros.signals.polynomials import largest_root
 def responses(
     outputs: Sequence[Mapping[str, Any]], record: Record, units: Units, truth: LoopModel | None
 ) -> str:
-    """Return a figure of each output with its responses to a step of each stem by 1 %.
-
-    Args:
-        outputs: of ``identify --json``.
-        record: that they were identified from.
-        units: of its signals.
-        truth: simulated loop, None when unknown.
-    """
+    """Return a figure of each output with its responses to a step of each stem by 1 %."""
     if not outputs:
         return ""
     length = settling(outputs, truth)
@@ -57,13 +50,7 @@ def responses(
 
 
 def step_response(output: Mapping[str, Any], valve: str, samples: int) -> FloatArray:
-    """Return the response, shape (N,), of one identified output to a stem step of 1 %.
-
-    Args:
-        output: entry of ``outputs`` of ``identify --json``: a, b, delay.
-        valve: whose stem steps at sample 0.
-        samples: N.
-    """
+    """Return the response, (N,), of an output of ``identify --json`` to a stem step of 1 %."""
     if valve not in output["b"]:
         return np.zeros(samples)
     delay = int(output["delay"].get(valve, 0))
@@ -73,13 +60,7 @@ def step_response(output: Mapping[str, Any], valve: str, samples: int) -> FloatA
 def free_run(
     output: OutputModel, stems: Mapping[str, FloatArray], measured: FloatArray
 ) -> FloatArray:
-    """Return PV of an identified output driven by stems alone, its start fitted, shape (N,).
-
-    Args:
-        output: equation (9).
-        stems: positions of each valve, shape (N,), %.
-        measured: PV, shape (N,).
-    """
+    """Return PV, (N,), of an output (9) driven by stems, (N,), %, alone, its start fitted."""
     delays = [output.delay[valve] for valve in output.b]
     drive = driven(output.b.values(), delays, [stems[valve] for valve in output.b], output.bias)
     return fitted_free_run(output.a, drive, measured)

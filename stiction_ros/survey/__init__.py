@@ -1,4 +1,1 @@
-"""Every loop of a plant, ranked by what to service first.
-
-Nothing is imported here: assessing takes compiled code, listing what was found does not.
-"""
+"""Every loop of a plant, ranked by what to service first; nothing is imported here."""

@@ -16,7 +16,7 @@ from stiction_ros.identification import Identification, identify
 from stiction_ros.identification.valve_test.facts import Limits, facts_before
 from stiction_ros.identification.valve_test.plan import first_round
 from stiction_ros.intake.loop import Loop
-from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE
+from stiction_ros.records.csv_writer import DEFAULT_OUTPUT, DEFAULT_VALVE
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
@@ -29,22 +29,13 @@ from stiction_ros.survey.pages.loop_page import loop_page
 from stiction_ros.survey.pages.words import cause_words
 from stiction_ros.survey.survey_options import SurveyOptions
 
-FEWEST = 100
-"""Samples in automatic below which nothing is judged."""
-
-NEAR_LIMIT = 1e-6
-"""Share of OP's range within which it stands at an end of it."""
+FEWEST = 100  # samples in automatic below which nothing is judged
+NEAR_LIMIT = 1e-6  # share of OP's range within which it stands at an end of it
 
 
 @dataclasses.dataclass(frozen=True)
 class Assessed:
-    """What is said of one loop.
-
-    Attributes:
-        entry: its row.
-        page: HTML of its page; empty where none was wanted or there is nothing to show.
-        log: decisions in their order, one sentence each.
-    """
+    """What is said of one loop: its row, HTML of its page, which may be empty, and decisions."""
 
     entry: Entry
     page: str = ""

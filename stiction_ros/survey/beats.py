@@ -8,14 +8,9 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.signals.movement import moving, size
 from stiction_ros.signals.oscillation import turnings
 
-MOST = 200
-"""Beats that are kept of a record, the last ones."""
-
-FEWEST = 5
-"""Beats of one loop, while the other one was recorded too, from which two can be compared."""
-
-ALIKE = 0.05
-"""Logarithm of the ratio of two periods up to which they may be the same."""
+MOST = 200  # beats that are kept of a record, the last ones
+FEWEST = 5  # beats of one loop from which two can be compared
+ALIKE = 0.05  # logarithm of the ratio of two periods up to which they may be the same
 
 LOCKED = 0.85
 """Mean resultant length of the phases from which on two loops keep the same time: 1 is to the
@@ -23,12 +18,7 @@ sample; two cycles of their own that part by half a turn within the record come 
 
 
 def beats(error: FloatArray, period: float) -> FloatArray:
-    """Return the samples, not whole, at which PV − SP sets out upwards through its slow mean.
-
-    Args:
-        error: shape (N,).
-        period: samples.
-    """
+    """Return the samples, not whole, at which PV − SP, (N,), sets out upwards through its mean."""
     moved = moving(error, period)
     rows = []
     for k in turnings(moved, 0.3 * size(moved)).tolist():
@@ -39,10 +29,7 @@ def beats(error: FloatArray, period: float) -> FloatArray:
 
 
 def locked(one: FloatArray, other: FloatArray) -> bool:
-    """Tell whether two loops keep the same time: each begins its cycle at one phase of the other.
-
-    Args:
-        one, other: beats, s on one clock.
+    """Tell whether two loops' beats, s on one clock, keep the same time: one begins at one phase.
 
     References:
         K. V. Mardia, P. E. Jupp: Directional Statistics, Wiley 2000, section 2.3.

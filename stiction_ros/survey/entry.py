@@ -33,65 +33,40 @@ class Cycling:
 
 @dataclasses.dataclass(frozen=True)
 class Entry:
-    """One row of the list; None where there is nothing to say.
+    """One row of the list; None where there is nothing to say."""
 
-    Attributes:
-        name: tag of the loop.
-        files: that it was read from.
-        status, reason: how far it came and why no further; reason is empty when it was judged.
-        samples: of all parts.
-        sample_time: s.
-        auto_share: share of the samples in automatic.
-        saturated_share: share of those with OP at rest at an end of its range.
-        oscillation: of PV − SP.
-        verdict: of the valve.
-        cause: of the oscillation.
-        f_s, f_d: frictions with their intervals, in the unit of OP.
-        band_share: f_S + f_D over the width of OP's movement.
-        travel_per_hour, reversals_per_hour: of the stem, as recorded.
-        gain: measures now and by option, as ``stiction gain`` gives them.
-        probability: of friction in the valve, 0 to 1; None where a method does not tell.
-        test: what the first round of a valve test would take where the valve is undecided:
-            ``duration``, s, and ``pv_move``, how far PV is expected to move.
-        evidence: figures behind the verdict by name, as in ``identify --json``.
-        cost_per_hour: what the cycle costs, where a cost was given.
-        rank: place in the list, from 1.
-        group: number of the group of loops that cycle together, from 1.
-        report: page of the loop, relative to the list.
-        op_unit: what OP, friction and travel are in.
-        notes: what was repaired, left out, found; one sentence each.
-        beats: when cycles begin, s on the clock of the record.
-    """
-
-    name: str
-    files: tuple[str, ...]
-    status: Status
+    name: str  # tag of the loop
+    files: tuple[str, ...]  # that it was read from
+    status: Status  # status, reason: how far it came, and why no further, empty when judged
     reason: str = ""
-    samples: int | None = None
-    sample_time: float | None = None
-    auto_share: float | None = None
-    saturated_share: float | None = None
-    oscillation: Cycling | None = None
-    verdict: str | None = None
-    cause: str | None = None
-    f_s: float | None = None
+    samples: int | None = None  # of all parts
+    sample_time: float | None = None  # s
+    auto_share: float | None = None  # share of the samples in automatic
+    saturated_share: float | None = None  # share of those with OP at rest at an end of its range
+    oscillation: Cycling | None = None  # of PV − SP
+    verdict: str | None = None  # of the valve
+    cause: str | None = None  # of the oscillation
+    f_s: float | None = None  # f_s, f_d: frictions with their intervals, in the unit of OP
     f_s_interval: Interval | None = None
     f_d: float | None = None
     f_d_interval: Interval | None = None
-    band_share: float | None = None
-    travel_per_hour: float | None = None
+    band_share: float | None = None  # f_S + f_D over the width of OP's movement
+    travel_per_hour: float | None = None  # travel_per_hour, reversals_per_hour: of the stem
     reversals_per_hour: float | None = None
-    gain: Mapping[str, Any] | None = None
-    probability: float | None = None
+    gain: Mapping[str, Any] | None = None  # measures now and by option, as of ``stiction gain``
+    probability: float | None = None  # of friction, 0 to 1; None where a method does not tell
+    # figures behind the verdict by name, as in ``identify --json``
     evidence: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    # what the first round of a valve test would take where the valve is undecided: ``duration``, s,
+    # and ``pv_move``, how far PV is expected to move
     test: Mapping[str, float | None] | None = None
-    cost_per_hour: float | None = None
-    rank: int | None = None
-    group: int | None = None
-    report: str | None = None
-    op_unit: str = "%"
-    notes: tuple[str, ...] = ()
-    beats: tuple[float, ...] = ()
+    cost_per_hour: float | None = None  # what the cycle costs, where a cost was given
+    rank: int | None = None  # place in the list, from 1
+    group: int | None = None  # number of the group of loops that cycle together, from 1
+    report: str | None = None  # page of the loop, relative to the list
+    op_unit: str = "%"  # what OP, friction and travel are in
+    notes: tuple[str, ...] = ()  # what was repaired, left out, found; one sentence each
+    beats: tuple[float, ...] = ()  # when cycles begin, s on the clock of the record
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of ``survey --json``."""

@@ -1,9 +1,7 @@
 """Loops that cycle together, the likely source first.
 
-A valve that makes its own loop cycle moves what lies around it at its period and never the other
-way round, so a loop whose cause is its valve comes first; then one that rings by its tuning; a
-loop that only bears a wave from outside comes last. Among equals the more regular one is nearer
-to the source: what the cycle passes through adds noise.
+A valve that makes its own loop cycle moves what lies around it at its period, so its loop comes
+first; then one that rings by its tuning; last what only bears a wave. The more regular is nearer.
 """
 
 from __future__ import annotations
@@ -24,23 +22,18 @@ NEARNESS = {"valve": 0, "tuning": 1, "unknown": 2, "none": 2, "disturbance": 3, 
 
 @dataclasses.dataclass(frozen=True)
 class Group:
-    """Loops that cycle together.
+    """Loops that cycle together."""
 
-    Attributes:
-        number: from 1.
-        period: s, the median.
-        names: of the loops, the likely source first.
-    """
-
-    number: int
-    period: float
-    names: tuple[str, ...]
+    number: int  # from 1
+    period: float  # s, the median
+    names: tuple[str, ...]  # of the loops, the likely source first
 
 
 def grouped(entries: Sequence[Entry]) -> tuple[list[Entry], list[Group]]:
     """Return the entries with the numbers of their groups, and the groups."""
     times = [np.array(entry.beats) for entry in entries]
-    clocks = [_clock(entry) for entry in entries]
+    # What two loops must share for their times to compare: dates, else their files.
+    clocks = ["dates" if e.beats and e.beats[0] > DATES else e.files for e in entries]
     cycling = [k for k, entry in enumerate(entries) if len(entry.beats) and _period(entry) > 0.0]
     cycling.sort(key=lambda k: _period(entries[k]))
     parent = list(range(len(entries)))
@@ -72,11 +65,6 @@ def grouped(entries: Sequence[Entry]) -> tuple[list[Entry], list[Group]]:
         for k in rows:
             numbered[k] = dataclasses.replace(numbered[k], group=number)
     return numbered, groups
-
-
-def _clock(entry: Entry) -> object:
-    """Return what two loops must share for their times to compare: dates, else their files."""
-    return "dates" if entry.beats and entry.beats[0] > DATES else entry.files
 
 
 def _period(entry: Entry) -> float:

@@ -6,7 +6,6 @@ import hashlib
 import itertools
 import json
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Any
 
 from stiction_ros.errors import InputError
@@ -21,16 +20,9 @@ class Journal:
     """One file; its first line says what the options were, each other one holds a loop."""
 
     def __init__(self, folder: Path, mark: str, *, resume: bool) -> None:
-        """Open the journal of a folder.
+        """Open the journal of a folder that is there, by the ``mark`` of the options.
 
-        Args:
-            folder: of the survey; it is there.
-            mark: of the options.
-            resume: whether what is there counts; else no loop may be there.
-
-        Raises:
-            InputError: it was written with other options, or by something else; or it holds loops
-                that are not to be gone on with.
+        What is there counts to ``resume``; else no loop may be there. Another mark is refused.
         """
         self.path = folder / FILE
         self.known: dict[str, Entry] = {}
@@ -79,12 +71,7 @@ class Journal:
     def __enter__(self) -> Journal:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._file.close()
 
 

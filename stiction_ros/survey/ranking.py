@@ -1,14 +1,10 @@
 """In which order loops are serviced: the one rule, and its reason.
 
-1. *Kind*: valves that stick or have backlash and make their loop cycle; then those found whose
-   cycle has another cause, where a service helps less; then valves that the record does not
-   decide, which are worth a look; then healthy valves in loops that cycle for another reason,
-   which are nobody's work in the valve shop; then the rest; at the end what was not judged.
-2. Among one kind *P × what a service would bring*, with P the probability of friction: a planner
-   who works from the top down finds what is surest and largest first. A service brings the share
-   of the loop's movement that goes away without the friction, simulated; where a cost was given it
-   is multiplied by what the cycle costs over the median of what was given. A loop without a figure
-   stands as one that costs as much as most.
+1. *Kind*: valves found that make their loop cycle; those found whose cycle has another cause;
+   undecided valves; healthy valves in loops that cycle; the rest; what was not judged.
+2. Among one kind *P × what a service would bring*: the probability of friction by the share of the
+   loop's movement that goes away without the friction, simulated; where a cost was given it
+   is multiplied by what the cycle costs over the median of what was given.
 """
 
 from __future__ import annotations
@@ -35,9 +31,7 @@ def kind(entry: Entry) -> int:
 def ranked(entries: Sequence[Entry], costs: Mapping[str, float]) -> list[Entry]:
     """Return the entries in their order with rank and what their cycles cost.
 
-    Args:
-        entries: of all loops.
-        costs: by name, money per hour for a |PV − SP| of one engineering unit.
+    The ``costs`` by name are money per hour for a |PV − SP| of one engineering unit.
     """
     priced = [
         dataclasses.replace(entry, cost_per_hour=_cost(entry, costs.get(entry.name)))

@@ -25,19 +25,12 @@ LOG = "survey.log"
 
 @dataclasses.dataclass(frozen=True)
 class Reached:
-    """How far a survey is.
+    """How far a survey is."""
 
-    Attributes:
-        done: loops that have their row.
-        before: of these, those that were taken from the survey that it goes on with.
-        drawn: loops that were read.
-        entry: the last row.
-    """
-
-    done: int
-    before: int
-    drawn: int
-    entry: Entry
+    done: int  # loops that have their row
+    before: int  # of these, those that were taken from the survey that it goes on with
+    drawn: int  # loops that were read
+    entry: Entry  # the last row
 
 
 Progress = Callable[[Reached], None]
@@ -45,23 +38,15 @@ Progress = Callable[[Reached], None]
 
 @dataclasses.dataclass(frozen=True)
 class Survey:
-    """What a survey found.
+    """What a survey found."""
 
-    Attributes:
-        engine, workers, seconds: how it was done.
-        entries: by rank.
-        groups: of loops that cycle together.
-        date: when it was done, ISO.
-        before: loops that were taken from the survey that it went on with.
-    """
-
-    engine: str
+    engine: str  # engine, workers, seconds: how it was done
     workers: int
     seconds: float
-    entries: tuple[Entry, ...]
-    groups: tuple[Group, ...]
-    date: str = ""
-    before: int = 0
+    entries: tuple[Entry, ...]  # by rank
+    groups: tuple[Group, ...]  # of loops that cycle together
+    date: str = ""  # when it was done, ISO
+    before: int = 0  # loops that were taken from the survey that it went on with
 
     @property
     def judged(self) -> int:
@@ -85,35 +70,18 @@ class Survey:
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """How a survey is done.
+    """How a survey is done."""
 
-    Attributes:
-        options: of each loop.
-        out: folder of journal, log and pages; None keeps nothing.
-        resume: whether what the folder holds already is not done again.
-        costs: by loop, see :func:`.ranking.ranked`.
-    """
-
-    options: SurveyOptions
-    out: Path | None = None
-    resume: bool = False
-    costs: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    options: SurveyOptions  # of each loop
+    out: Path | None = None  # folder of journal, log and pages; None keeps nothing
+    resume: bool = False  # whether what the folder holds already is not done again
+    costs: Mapping[str, float] = dataclasses.field(default_factory=dict)  # ``ranking.ranked``
 
 
 def survey(
     loops: Iterable[Loop], plan: Plan, engine: Engine, progress: Progress | None = None
 ) -> Survey:
-    """Judge every loop and rank them.
-
-    Args:
-        loops: drawn one after the other, no faster than the engine takes them.
-        plan: how.
-        engine: where; it is closed at the end, whatever happens.
-        progress: called after each loop.
-
-    Raises:
-        InputError: a folder that cannot be written or holds another survey.
-    """
+    """Judge every loop and rank them; the engine is closed at the end, whatever happens."""
     if plan.out is None:
         if plan.resume:
             raise InputError("has nothing to go on from", where="--resume", fix="add --out DIR")

@@ -9,21 +9,13 @@ from stiction_ros.identification.identification_options import IdentificationOpt
 
 @dataclasses.dataclass(frozen=True)
 class SurveyOptions:
-    """What a worker is told beside the loop.
+    """What a worker is told beside the loop."""
 
-    Attributes:
-        identification: options of every identification.
-        gain: whether what would help is simulated for the valves that are found.
-        pages: whether a page is written for each loop.
-        units: engineering unit of PV by loop, for the pages.
-        read_by: how the exports are read; other ways give other records.
-    """
-
-    identification: IdentificationOptions = IdentificationOptions()
-    gain: bool = True
-    pages: bool = True
-    units: tuple[tuple[str, str], ...] = ()
-    read_by: str = ""
+    identification: IdentificationOptions = IdentificationOptions()  # of every identification
+    gain: bool = True  # whether what would help is simulated for the valves that are found
+    pages: bool = True  # whether a page is written for each loop
+    units: tuple[tuple[str, str], ...] = ()  # engineering unit of PV by loop, for the pages
+    read_by: str = ""  # how the exports are read; other ways give other records
 
     def unit(self, name: str) -> str:
         """Return the unit of a loop's PV; empty where none was given."""

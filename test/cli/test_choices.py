@@ -10,13 +10,13 @@ from stiction_ros.identification.answer.loop_kind import LoopKind
 from stiction_ros.identification.friction.grid import laws
 from stiction_ros.identification.identification_options import LOOP_KINDS
 from stiction_ros.identification.linear.data import LinearKind, OrderCriterion
-from stiction_ros.paper import methods
+from stiction_ros.paper.paper_options import METHOD_NAMES
 from stiction_ros.signals.subspace_projection import SubspaceMethod
 
 
 def test_every_choice_is_known_and_none_is_missing() -> None:
-    assert (*METHODS, *methods.METHODS) == searches.METHODS
-    assert tuple(methods.METHODS) == searches.PAPER_METHODS
+    assert (*METHODS, *METHOD_NAMES) == searches.METHODS
+    assert METHOD_NAMES == searches.PAPER_METHODS
     assert set(searches.laws()) == set(laws())
     assert tuple(kind.value for kind in LoopKind) == searches.LOOP_KINDS == LOOP_KINDS
     assert tuple(kind.value for kind in LinearKind) == searches.LINEAR_KINDS

@@ -15,10 +15,10 @@ from stiction_ros.loop import (
     LoopModel,
     PiController,
     SetPoints,
-    own_controller,
     simulate,
     simulate_closed_loop,
 )
+from stiction_ros.loop.closed_loop import own_controller
 
 FLOW = find_config("flow.loop.yaml")
 MOVES = find_config("flow.set_points.yaml")

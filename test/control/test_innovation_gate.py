@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiction_ros.control.innovation_gate import InnovationGate
+from stiction_ros.control.observer import InnovationGate
 
 
 def gate(outputs: int = 1) -> InnovationGate:

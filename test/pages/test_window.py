@@ -10,7 +10,7 @@ from made import identification, record
 
 from stiction_ros.identification.result.cause import CauseKind
 from stiction_ros.identification.result.identification import FitStatus, Identification
-from stiction_ros.pages.window import CYCLES, UNCYCLED, Window
+from stiction_ros.pages.signals import CYCLES, UNCYCLED, Window
 from stiction_ros.records.quality import Quality
 
 PERIOD, SAMPLES = 60.0, 1200

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
-from stiction_ros.paper.equation_error import EquationError, fit_outputs
+from stiction_ros.paper.one_step_result import EquationError, fit_outputs
 from stiction_ros.paper.smoothed_laws import smooth_law
 from stiction_ros.records import Record
 from stiction_ros.signals.arx_fit import ArxOrders, Delays, fit_arx, stable_arx

@@ -9,17 +9,13 @@ import simulated_loops as loops
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.paper import methods
-from stiction_ros.paper.methods import METHODS, identify
+from stiction_ros.paper.methods import identify
 from stiction_ros.paper.paper_options import METHOD_NAMES, PaperOptions
+from stiction_ros.paper.programme import nlp
 
 SMALL = PaperOptions(
     output_order=1, input_order=1, delay=(5, 5), starts=1, grid_step=2.0, friction_limit=6.0
 )
-
-
-def test_the_table_and_the_options_name_the_same_methods() -> None:
-    assert tuple(METHODS) == METHOD_NAMES
 
 
 @pytest.mark.parametrize("method", METHOD_NAMES)
@@ -80,6 +76,6 @@ def test_swapped_columns_are_refused_before_a_slow_method_begins(
 ) -> None:
     record = loops.example1(1, samples=900)
     swapped = dataclasses.replace(record, op=record.pv, pv=record.op)
-    monkeypatch.setattr(methods, "METHODS", {"nlp": lambda *_: pytest.fail("it began")})
+    monkeypatch.setattr(nlp, "identify_by_programme", lambda *_: pytest.fail("it began"))
     with pytest.raises(InputError, match="look swapped"):
         identify(swapped, PaperOptions())

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, Identification, VerdictKind
-from stiction_ros.paper.equation_error import fit_outputs
 from stiction_ros.paper.methods import identify
+from stiction_ros.paper.one_step_result import fit_outputs
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme

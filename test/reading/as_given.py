@@ -9,7 +9,7 @@ from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.intake import is_bag, one_loop
 from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions, OpUnit, TimeUnit
 from stiction_ros.intake.sheets.typed import open_sheets
-from stiction_ros.records.csv_names import tagged_columns
+from stiction_ros.records.csv_writer import tagged_columns
 from stiction_ros.records.parts import only_part
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.bag_reader import read_bag_parts

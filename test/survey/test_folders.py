@@ -15,7 +15,7 @@ from made import entry
 from stiction_ros.intake import IntakeOptions, Loop, loops, one_loop
 from stiction_ros.intake.intake import is_bag
 from stiction_ros.records.bag.writer import BagWriter
-from stiction_ros.survey.listing.tables import HEAD, cells, write_csv
+from stiction_ros.survey.listing.tables import row_of, write_csv
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "records"))
 from bag_making import Bag
@@ -141,7 +141,7 @@ def test_a_folder_that_cannot_be_listed_is_a_reason(
 @pytest.mark.parametrize("first", ["=", "+", "-", "@", "\t", "\r"])
 def test_no_text_of_the_list_is_a_formula(tmp_path: Path, first: str) -> None:
     row = entry(f"{first}1+1", verdict="healthy", reason=f"{first}A1", f_s=-1.5)
-    found = dict(zip(HEAD, cells(row), strict=True))
+    found = row_of(row)
     assert (found["loop"], found["reason"]) == (f"'{first}1+1", f"'{first}A1")
     assert found["f_S"] == -1.5
     write_csv(tmp_path / "list.csv", [row])

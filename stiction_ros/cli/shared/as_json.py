@@ -21,13 +21,7 @@ def write_json(target: str, value: Any) -> None:
 
 
 def hand_over(target: str | None, value: Any, show: Callable[[], object]) -> None:
-    """Write a result as JSON where ``--json`` asks for it, and show it to people.
-
-    Args:
-        target: what ``--json`` names, ``-`` for standard output; None where it is not given.
-        value: the result.
-        show: prints it; not called where standard output holds the JSON.
-    """
+    """Write a result as JSON where ``--json`` asks for it, and show it unless that is on ``-``."""
     if target is not None:
         write_json(target, value)
     if target != "-":

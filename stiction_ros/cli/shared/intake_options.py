@@ -41,12 +41,7 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
 
 
 def add_intake(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
-    """Add the options of exports: tags, units, dates, what is repaired.
-
-    Args:
-        parser: of a command.
-        many: whether the command takes all loops that there are.
-    """
+    """Add the options of exports to a command that takes one loop, or ``many``."""
     group = parser.add_argument_group("exports")
     group.add_argument(
         "--tags",
@@ -112,11 +107,7 @@ def columns(options: argparse.Namespace) -> CsvColumns:
 
 
 def intake_options(options: argparse.Namespace) -> IntakeOptions:
-    """Return how the command line wants exports to be read.
-
-    Raises:
-        InputError: a sample time that is none.
-    """
+    """Return how the command line wants exports to be read."""
     step = options.sample_time
     if step is not None and not 0.0 < step < 1e9:
         raise InputError(f"{step:g} s is no sample time", where="--sample-time")
@@ -159,11 +150,7 @@ def opened(options: argparse.Namespace) -> Loop:
 
 
 def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
-    """Print what would be read from where: ``--dry-run``.
-
-    Returns:
-        Exit code: 0, or 1 when no loop can be read.
-    """
+    """Print what would be read from where, ``--dry-run``; 1 when no loop can be read."""
     readable = known = 0
     for loop in loops(paths, options):
         known += 1
@@ -182,13 +169,7 @@ def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
 
 
 def tell_strangers(file: str | Path | None, what: str, names: Sequence[str]) -> None:
-    """Print to standard error which names of a file are not there, as they may be misspelt.
-
-    Args:
-        file: that has the names.
-        what: is called so, in a word.
-        names: that nothing has.
-    """
+    """Print to standard error which ``names`` of a file are not there, as they may be misspelt."""
     if names:
         more = " and others" if len(names) > OTHERS else ""
         print(f"{file}: no {what} is called {', '.join(names[:OTHERS])}{more}", file=sys.stderr)

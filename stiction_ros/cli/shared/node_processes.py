@@ -67,11 +67,7 @@ class NodeProcesses:
         self._moved = time.monotonic()
 
     def wait(self, progress: Callable[[float], None]) -> None:
-        """Wait until the plant has run all its samples.
-
-        Raises:
-            NodeError: a node ended before, or nothing moves any more.
-        """
+        """Wait until the plant has run all; NodeError if a node ends before, or all stand."""
         plant = self._processes["plant"]
         while plant.poll() is None:
             for name, process in self._processes.items():

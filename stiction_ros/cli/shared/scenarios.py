@@ -1,8 +1,4 @@
-"""The scenarios that come along, and the parameters of their nodes.
-
-The command ``demo`` and the launch file start the same nodes with the same parameters: both
-take them from here.
-"""
+"""The scenarios that come along, and the parameters of their nodes, for demo and launch."""
 
 from __future__ import annotations
 
@@ -15,19 +11,13 @@ import yaml
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 
-SCENARIOS = ("tank", "siso")
-"""Those that are run where none is named."""
+SCENARIOS = ("tank", "siso")  # those that are run where none is named
 ALL = (*SCENARIOS, "siso_test", "tank_test")
-STARTED = ("recorder", "estimator", "controller", "plant")
-"""The nodes of a loop, in the order in which they are started."""
+STARTED = ("recorder", "estimator", "controller", "plant")  # in this order
 
 
 def find(name: str) -> Path:
-    """Return the file of a scenario: one that comes along, or a ``*.yaml`` file of the user.
-
-    Raises:
-        InputError: neither.
-    """
+    """Return the file of a scenario: one that comes along, or a ``*.yaml`` file of the user."""
     if name.endswith((".yaml", ".yml")):
         return find_config(name)
     if name in ALL:
@@ -60,14 +50,7 @@ def _placed(
 def loop_nodes(
     path: Path, directory: Path, *, seed: int | None = None, speed: float | None = None
 ) -> dict[str, dict[str, Any]]:
-    """Return the parameters of the nodes of a loop, by name, in the order of their start.
-
-    Args:
-        path: scenario file.
-        directory: where the bag goes.
-        seed: of the noise; None for that of the scenario.
-        speed: simulated seconds per second; None for lockstep, as fast as the machine can.
-    """
+    """Return the parameters of the nodes of a loop in order of start; no speed is lockstep."""
     nodes = node_parameters(path, directory)
     if seed is not None:
         nodes["plant"]["seed"] = seed
@@ -82,11 +65,7 @@ def bridged_nodes(
 ) -> dict[str, dict[str, Any]]:
     """Return the parameters of the nodes of a loop whose plant is behind a bridge, or elsewhere.
 
-    Args:
-        path: scenario file; it need not have a plant, which is left out.
-        directory: where the bag goes.
-        speed: seconds of the plant per second.
-        source: what the others wait for in place of the plant, an entry of ``wait_for``.
+    The ``source`` is what the others wait for in place of the plant, an entry of ``wait_for``.
     """
     from stiction_ros.online.session import read_nodes
 

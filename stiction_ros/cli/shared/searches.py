@@ -116,11 +116,7 @@ def refuse_channel_orders(
 
 
 def search_options(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of single searches that were given.
-
-    Raises:
-        InputError: an option that the method at hand does not have.
-    """
+    """Return the options of single searches that were given; the method at hand must have them."""
     chosen: dict[str, Any] = {}
     for option, (key, methods) in OWNERS.items():
         value = getattr(options, key)
@@ -137,17 +133,9 @@ def search_options(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def identify_by(
-    method: str,
-    options: IdentificationOptions,
-    chosen: dict[str, Any],
+    method: str, options: IdentificationOptions, chosen: dict[str, Any]
 ) -> Callable[[Record, Callable[[float], None]], Identification]:
-    """Return what identifies a record by one method.
-
-    Args:
-        method: of :data:`METHODS`.
-        options: orders, delays and law.
-        chosen: of :func:`search_options`.
-    """
+    """Return what identifies a record by one of :data:`METHODS`, as ``chosen``."""
     if method in PAPER_METHODS:
         from stiction_ros.paper.methods import identify as identify_as_paper
         from stiction_ros.paper.paper_options import PaperOptions

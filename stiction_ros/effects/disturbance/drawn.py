@@ -11,10 +11,7 @@ from stiction_ros.effects.behaviour import NO_SAMPLE, Behaviour, Memory
 
 @dataclasses.dataclass(frozen=True)
 class DrawnDisturbance(Behaviour):
-    """What they share: a wave w of which nothing is expected from rest.
-
-    The memory is (w, time of the last sample).
-    """
+    """A wave w of which nothing is expected from rest; memory: (w, time of the last sample)."""
 
     places: ClassVar[tuple[str, ...]] = ("load", "disturbance")
 

@@ -39,13 +39,7 @@ class HeStiction(FrictionPair):
     switching: ClassVar[Switching] = SLIPS
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        """Return the stem position twice, as memory and as output, by (4).
-
-        Args:
-            memory: stem position χ, %.
-            value: OP, %.
-            time: s; without meaning here.
-        """
+        """Return the stem χ, %, twice, as memory and as output, of OP ``value``, %, by (4)."""
         assert isinstance(memory, float | int)
         error = value - memory
         if error > self.static_friction:
@@ -64,13 +58,9 @@ class HeStiction(FrictionPair):
     def simulate_grid(
         cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once.
+        """Return stems, %, shape (N, G), of OP ``values``, (N,), for rows (f_S, f_D) of ``grid``.
 
-        Args:
-            grid: rows (f_S, f_D), %, shape (G, 2).
-            values: OP, %, shape (N,).
-            start: stem before the first sample, %, one for all or shape (G,).
-            sample_time: s; without meaning here.
+        They begin at ``start``, %, one for all or shape (G,); ``sample_time`` has no meaning here.
         """
         # Compiled code takes half a second to import, which nodes that scan no grid save.
         from stiction_ros.effects.grid_kernels import he_stems

@@ -39,15 +39,7 @@ class SmoothedHeStiction(HeStiction):
 def smoothed_step(
     stem: Any, value: Any, frictions: tuple[Any, Any], smoothing: Any, tanh: Any
 ) -> Any:
-    """Return the next stem position by (5) and (6).
-
-    Args:
-        stem: χ_{k−1}, %.
-        value: OP u_k, %.
-        frictions: f_S and f_D, %.
-        smoothing: τ, 1/%.
-        tanh: of numbers or of CasADi expressions, as the other arguments are.
-    """
+    """Return the next stem position by (5), (6); ``tanh`` is of numbers or CasADi expressions."""
     static, dynamic = frictions
     error = value - stem
     above = tanh(smoothing * (error + static))

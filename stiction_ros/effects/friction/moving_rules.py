@@ -1,9 +1,8 @@
 r"""Switching patterns of the laws with a moving state: Kano's, XCH and Choudhury's.
 
 While these valves move, χ_k = u_k − σ f_D; once they stop, at the OP u_s of the last moving
-sample, the stem stays at u_s − σ f_D. Whether and when they stop depends on OP alone, and what
-releases them compares :math:`u_k - u_s` with J = f_S − f_D or S = f_S + f_D. So, as for He's law
-(:mod:`stiction_ros.identification.switching.patterns`), the frictions with one and the same pattern
+sample, the stem stays at u_s − σ f_D. When they stop depends on OP alone, and what releases them
+compares :math:`u_k - u_s` with J = f_S − f_D or S = f_S + f_D. So the frictions with one pattern
 fill a rectangle in the plane of (J, S), and inside it the stem is affine in f_D.
 
 - Kano and XCH: a moving valve follows OP until OP rests or turns, :math:`\sigma (u_k - u_{k-1})
@@ -32,17 +31,11 @@ FirstSlip = tuple[int, float]
 
 @dataclasses.dataclass(frozen=True)
 class MovingTrace:
-    """Where one valve moves, stops and slips, and what that says of J and S.
+    """Where one valve moves, stops and slips, and what that says of J and S."""
 
-    Attributes:
-        base: OP at the last moving sample, before the first slip the stem's level, shape (N,).
-        sign: direction of the last motion, 0 before the first, shape (N,).
-        bounds: (J low, J high, S low, S high), %.
-    """
-
-    base: FloatArray
-    sign: FloatArray
-    bounds: tuple[float, float, float, float]
+    base: FloatArray  # OP at the last moving sample, first the stem's level, shape (N,)
+    sign: FloatArray  # direction of the last motion, 0 before the first, shape (N,)
+    bounds: tuple[float, float, float, float]  # (J low, J high, S low, S high), %
 
 
 class MovingRules(ABC):
@@ -76,11 +69,9 @@ class MovingRules(ABC):
     def trace(
         self, point: Iterable[float], level: float, first: FirstSlip | None = None
     ) -> MovingTrace:
-        """Return the trace of a valve at rest at ``level``.
+        """Return the trace of a valve at rest at ``level`` with J and S, %.
 
-        Args:
-            point: J and S, %.
-            first: sample and direction of the first slip; None lets f_S = (S + J)/2 decide.
+        The first slip, sample and direction, may be given; None lets f_S = (S + J)/2 decide.
         """
         jump, reverse = point
         if first is None:

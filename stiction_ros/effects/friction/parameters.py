@@ -1,7 +1,6 @@
 """The two ways to write the friction of a valve: (f_S, f_D), and (S, J).
 
-They describe the same signature: S = f_S + f_D is the width of the band that OP crosses
-after a reversal before the stem moves, J = f_S − f_D the jump that the stem then makes.
+S = f_S + f_D is the width of the band that OP crosses after a reversal, J = f_S − f_D the jump.
 """
 
 from __future__ import annotations
@@ -21,11 +20,7 @@ NOT_SEARCHED = "stiction is searched by the laws he and xch"  # what the laws he
 
 @dataclasses.dataclass(frozen=True)
 class FrictionPair(Stiction):
-    """A stiction law with static friction f_S and dynamic friction f_D, 0 ≤ f_D ≤ f_S.
-
-    Raises:
-        InputError: a negative or non-finite friction, or f_D > f_S.
-    """
+    """A stiction law with static friction f_S and dynamic friction f_D, 0 ≤ f_D ≤ f_S."""
 
     static_friction: float = parameter("f_s", "%", "static friction band f_S", low=0.0)
     dynamic_friction: float = parameter("f_d", "%", "dynamic friction f_D", low=0.0)
@@ -45,11 +40,7 @@ class FrictionPair(Stiction):
 
     @classmethod
     def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Self:
-        """Build from f_S and f_D in %, other parameters at their defaults.
-
-        Raises:
-            InputError: another parameter has no default.
-        """
+        """Build from f_S and f_D in %, other parameters at their defaults, which they must have."""
         _all_known(cls)
         return cls(static_friction, dynamic_friction)
 
@@ -75,9 +66,6 @@ class SlipJumpPair(Stiction):
 
     J = 0 is a pure deadband, J < S the undershoot, J = S no offset, J > S the overshoot
     case, whose dynamic friction f_D = (S − J)/2 is negative.
-
-    Raises:
-        InputError: a negative or non-finite S or J.
     """
 
     stick_band: float = parameter("s", "%", "deadband plus stickband S", low=0.0)
@@ -85,11 +73,7 @@ class SlipJumpPair(Stiction):
 
     @classmethod
     def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Self:
-        """Build from f_S and f_D in %: S = f_S + f_D, J = f_S − f_D, others at their defaults.
-
-        Raises:
-            InputError: another parameter has no default.
-        """
+        """Build from f_S and f_D in %: S = f_S + f_D, J = f_S − f_D, others at their defaults."""
         _all_known(cls)
         return cls(static_friction + dynamic_friction, static_friction - dynamic_friction)
 

@@ -1,7 +1,4 @@
-"""What a law of stiction is, and what a controller sees of it that moves OP in steps.
-
-To such a controller a stem stays, or it jumps.
-"""
+"""What a law of stiction is, and what a controller sees of it that moves OP in steps."""
 
 from __future__ import annotations
 
@@ -104,10 +101,7 @@ class JumpForm:
     def margin(self, spread: FrictionSpread | None, share: float, floor: float) -> float:
         """Return by how much a planned jump exceeds the smallest one, %.
 
-        Args:
-            spread: half-widths of the intervals; None where there are none.
-            share: of f_S, taken when there are none.
-            floor: least share of f_S when there are.
+        It is the half-widths of the intervals, at least ``floor`` of f_S; without any ``share``.
         """
         if spread is None:
             wanted = share * self.static_friction
@@ -118,16 +112,7 @@ class JumpForm:
 
 @dataclasses.dataclass(frozen=True)
 class Stiction(Behaviour):
-    """What holds for every friction law that does not say otherwise.
-
-    Attributes:
-        switching: how its switching patterns are listed, so that a search can be exact:
-            :data:`SLIPS`, or the rules of a law with a moving state. The exact search refuses a law
-            with None, the default search takes it.
-        not_identified: why it is not identified, one clause; empty when it is.
-        held: keys of further parameters that stay at their defaults, which is said: constants of
-            the law. All others are identified.
-    """
+    """What holds for every friction law that does not say otherwise."""
 
     effect: ClassVar[str] = "stiction"
     places: ClassVar[tuple[str, ...]] = ("valve",)
@@ -141,20 +126,18 @@ class Stiction(Behaviour):
     family: ClassVar[str] = "friction"
     least: ClassVar[float] = 0.1  # %
     # For `stiction identify`.
+    # how its switching patterns are listed, so that a search can be exact: ``SLIPS``, or the rules
+    # of a law with a moving state. The exact search refuses a law with None, the default search
+    # takes it
     switching: ClassVar[Switching] = None
-    not_identified: ClassVar[str] = ""
+    not_identified: ClassVar[str] = ""  # why it is not identified, one clause; empty when it is
+    # keys of further parameters that stay at their defaults, which is said: constants of the law.
+    # All others are identified
     held: ClassVar[tuple[str, ...]] = ()
-    told_of_step: ClassVar[tuple[str, ...]] = (
-        *Behaviour.told_of_step,
-        *("switching", "jump_form"),
-    )
+    told_of_step: ClassVar[tuple[str, ...]] = (*Behaviour.told_of_step, *("switching", "jump_form"))
 
     def jump_form(self) -> JumpForm | None:
-        """Return the moves that it can make when OP rests between them.
-
-        Returns:
-            None for a law that has no such form, and so no OP can be planned for it.
-        """
+        """Return the moves that it can make when OP rests between them; None for no form."""
         return None
 
     def figures(self) -> dict[str, float]:

@@ -18,11 +18,8 @@ from stiction_ros.intake.words import pattern_of
 Cells = Sequence[str] | NDArray[np.float64] | NDArray[np.datetime64]
 """One column of a piece of a table: text, numbers or stamps."""
 
-BAD_WORDS = pattern_of("bad_words")
-"""What historians write in the place of a number; anything else that is no number counts too."""
-
-SHOWN = 30
-"""Characters of a cell that an error shows."""
+BAD_WORDS = pattern_of("bad_words")  # what historians write in the place of a number
+SHOWN = 30  # characters of a cell that an error shows
 
 _SIGNS = str.maketrans({"\u2212": "-", "\u00a0": "", "\u202f": "", "\u2009": "", "'": ""})
 """Signs in numbers that are typeset: a minus, and spaces and marks between thousands."""
@@ -68,17 +65,11 @@ def as_text(cells: Cells) -> Sequence[str]:
 
 @dataclasses.dataclass
 class Numbers:
-    """A column of numbers as it grows.
+    """A column of numbers as it grows."""
 
-    Attributes:
-        decimal_comma: whether a comma alone in a number is the decimal one; else it sets
-            thousands apart.
-        wrong: first cell that is no finite number, None for none.
-        words: what stood in the place of numbers, with its count; empty cells as ``''``.
-    """
-
-    decimal_comma: bool
-    wrong: Wrong | None = None
+    decimal_comma: bool  # whether a lone comma in a number is decimal, and sets no thousands apart
+    wrong: Wrong | None = None  # first cell that is no finite number, None for none
+    # what stood in the place of numbers, with its count; empty cells as ``''``
     words: Counter[str] = dataclasses.field(default_factory=Counter)
     _pieces: list[FloatArray] = dataclasses.field(default_factory=list)
     _blank: list[NDArray[np.bool_]] = dataclasses.field(default_factory=list)

@@ -13,17 +13,10 @@ from stiction_ros.intake.sheets.names import VALUE_NAMES, is_name, read_tag
 from stiction_ros.intake.sheets.stamps import is_stamp
 from stiction_ros.intake.words import pattern_of
 
-DELIMITERS = ("\t", ";", "|", ",")
-"""In the order in which they are tried: commas and bars may stand inside cells."""
-
-SPACE = " "
-"""What stands for white space of any length."""
-
-WHOLE = 0.6
-"""Share of the usual number of cells that a row of data has at least."""
-
-LOOKED_AT = 40
-"""Lines at the top of a file that are looked at."""
+DELIMITERS = ("\t", ";", "|", ",")  # in the order tried: commas and bars may stand inside cells
+SPACE = " "  # what stands for white space of any length
+WHOLE = 0.6  # share of the usual number of cells that a row of data has at least
+LOOKED_AT = 40  # lines at the top of a file that are looked at
 
 UNITS = pattern_of("units_row")
 _BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
@@ -31,21 +24,13 @@ _BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
 
 @dataclasses.dataclass(frozen=True)
 class Layout:
-    """Where things are in a table.
+    """Where things are in a table."""
 
-    Attributes:
-        header: names of the columns, without units in brackets; empty when there is none.
-        given: names as they stand there.
-        units: unit of each column, empty where not known.
-        first: row of cells (not counting blank ones) at which data begin.
-        place: row of cells of the header.
-    """
-
-    header: tuple[str, ...]
-    given: tuple[str, ...]
-    units: tuple[str, ...]
-    first: int = 0
-    place: int = 0
+    header: tuple[str, ...]  # names of the columns without units in brackets; empty for none
+    given: tuple[str, ...]  # names as they stand there
+    units: tuple[str, ...]  # unit of each column, empty where not known
+    first: int = 0  # row of cells (not counting blank ones) at which data begin
+    place: int = 0  # row of cells of the header
 
 
 def delimiter_of(lines: Sequence[str]) -> str:

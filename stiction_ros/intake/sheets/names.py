@@ -17,11 +17,8 @@ _KINDS = {word.replace(" ", ""): kind for word, kind in _QUALITIES.items()}
 _TELLING = re.compile(r"quality|qualit[äé]|qualitaet|validity|confidence|questionable")
 """Words that tell of a quality wherever they stand in a name."""
 
-SIGNALS: Mapping[str, str] = by_word("signals")
-"""Last part of a tag to its signal."""
-
-OR_ROW = "(or a row for this file in --tags)"
-"""What helps in one file where an option would hold for all."""
+SIGNALS: Mapping[str, str] = by_word("signals")  # last part of a tag to its signal
+OR_ROW = "(or a row for this file in --tags)"  # where an option would hold for all files
 
 _ATTRIBUTE = re.compile(r"(?i)[./](cv|f_cv|val|value|act|actual|target|measured)$")
 _BLOCK = re.compile(r"(?i)[./](pid\w*|regctl\w*|daca\w*|pic|fic_block|pidx|ctrl)$")

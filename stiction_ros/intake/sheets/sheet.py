@@ -14,21 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.errors import InputError
+from stiction_ros.intake.sheets import layout as tops
 from stiction_ros.intake.sheets import text
 from stiction_ros.intake.sheets.cells import Cells, is_number
-from stiction_ros.intake.sheets.layout import (
-    LOOKED_AT,
-    SPACE,
-    Layout,
-    delimiter_of,
-    layout_of,
-    spaced,
-)
 from stiction_ros.intake.sheets.names import OR_ROW, folded
 from stiction_ros.intake.sheets.stamps import is_stamp
 
-PIECE = 200_000
-"""Cells that are held as text at one time."""
+PIECE = 200_000  # cells that are held as text at one time
 
 _POINT, _COMMA = re.compile(r"[+-]?\d+\.\d+"), re.compile(r"[+-]?\d+,\d+")
 
@@ -38,23 +30,14 @@ Piece = tuple[Sequence[Cells], NDArray[np.int64]]
 
 
 class Sheet(abc.ABC):
-    """A table with a header.
+    """A table with a header."""
 
-    Attributes:
-        path: of the file.
-        name: of the table: the file's, and the sheet's of a workbook that has several.
-        layout: header, units, where data begin.
-        decimal_comma: whether a comma alone in a number is the decimal one.
-        header_once: whether no row of data may be taken for the header that returns.
-        row_word: what a row is called in errors.
-    """
-
-    path: Path
-    name: str
-    layout: Layout
-    decimal_comma: bool = False
-    header_once: bool = False
-    row_word: str = "line"
+    path: Path  # of the file
+    name: str  # of the table: the file's, and the sheet's of a workbook that has several
+    layout: tops.Layout  # header, units, where data begin
+    decimal_comma: bool = False  # whether a comma alone in a number is the decimal one
+    header_once: bool = False  # whether no row of data may be taken for the header that returns
+    row_word: str = "line"  # what a row is called in errors
 
     @property
     def mended(self) -> list[str]:
@@ -63,11 +46,7 @@ class Sheet(abc.ABC):
 
     @abc.abstractmethod
     def pieces(self, rows: int | None = None) -> Iterator[Piece]:
-        """Yield the data, so many ``rows`` at a time; None takes :data:`PIECE` cells.
-
-        Raises:
-            InputError: the file is damaged.
-        """
+        """Yield the data, so many ``rows`` at a time; None takes :data:`PIECE` cells."""
 
     def find(self, name: str) -> int | None:
         """Return the index of the one column ``name``, exact case first; None if absent."""
@@ -101,20 +80,16 @@ Rows = Callable[[], contextlib.AbstractContextManager[Iterator[tuple[int, list[s
 
 
 class RowSheet(Sheet):
-    """A table of text cells, row by row, with a ``delimiter`` between them, empty for a workbook.
-
-    Raises:
-        InputError: it is empty, has no header, or more cells than names.
-    """
+    """A table of text cells, row by row, with a ``delimiter``, empty for a workbook."""
 
     def __init__(self, path: Path, name: str, rows: Rows, delimiter: str) -> None:
         self.path, self.name, self._rows = path, name, rows
         with rows() as opened:
             filled = (cells for _, cells in opened if any(cell.strip() for cell in cells))
-            top = list(itertools.islice(filled, LOOKED_AT))
+            top = list(itertools.islice(filled, tops.LOOKED_AT))
         if not top:
             raise InputError("is empty", fix="give a CSV file with a header")
-        self.layout = layout_of(top)
+        self.layout = tops.layout_of(top)
         if not self.layout.header or all(is_number(cell) for cell in self.layout.header):
             names = (delimiter or ",").join(
                 ("OP", "PV") if len(top[0]) < 3 else ("t", "OP", "PV", "SP")[: len(top[0])]
@@ -206,14 +181,14 @@ def _plain(cell: str) -> str:
 def text_sheet(path: Path) -> Sheet:
     """Open a text file; comma, semicolon, tab, bar or white space between the cells."""
     with text.open_text(path) as opened:
-        lines = [line for line in itertools.islice(opened, LOOKED_AT) if line.strip()]
-    delimiter = delimiter_of(lines)
+        lines = [line for line in itertools.islice(opened, tops.LOOKED_AT) if line.strip()]
+    delimiter = tops.delimiter_of(lines)
 
     @contextlib.contextmanager
     def rows() -> Iterator[Iterator[tuple[int, list[str]]]]:
         with text.open_text(path) as opened:
-            if delimiter == SPACE:
-                yield ((line, spaced(row)) for line, row in enumerate(opened, start=1))
+            if delimiter == tops.SPACE:
+                yield ((line, tops.spaced(row)) for line, row in enumerate(opened, start=1))
                 return
             reader = csv.reader(opened, delimiter=delimiter)
             try:
@@ -238,5 +213,4 @@ def stem(path: Path) -> str:
 TEXT = ("csv", "tsv", "txt", "tab", "dat", "gz", "zst", "zstd")
 
 KINDS = (*TEXT, "parquet", "pq", "xlsx", "xlsm", "xls", "mcap", "db3")
-SUFFIXES = frozenset(f".{end}" for end in KINDS)
-"""Ends of the names of files that are read from folders."""
+SUFFIXES = frozenset(f".{end}" for end in KINDS)  # of files that are read from folders

@@ -21,8 +21,7 @@ from stiction_ros.intake.sheets.cells import SHOWN, Cells, Numbers, Wrong, is_nu
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.words import by_word
 
-DAY = 86_400_000_000
-"""Microseconds of a day."""
+DAY = 86_400_000_000  # microseconds of a day
 
 
 class _No(enum.IntEnum):
@@ -60,38 +59,24 @@ class DateOrder(enum.StrEnum):
 
 
 class Clock(NamedTuple):
-    """What times are counted from.
+    """What times are counted from."""
 
-    Attributes:
-        start: the first time; seconds since 1970 in UTC for dates, else as given.
-        dated: whether it is a date.
-        zoned: whether its zone is known.
-        zone: whose local time it is, where that is not yet brought to UTC; else empty.
-        daily: whether it counts from midnight each day.
-    """
-
-    start: float
-    dated: bool = False
-    zoned: bool = False
-    zone: str = ""
-    daily: bool = False
+    start: float  # the first time; seconds since 1970 in UTC for dates, else as given
+    dated: bool = False  # whether it is a date
+    zoned: bool = False  # whether its zone is known
+    zone: str = ""  # whose local time it is, where that is not yet brought to UTC; else empty
+    daily: bool = False  # whether it counts from midnight each day
 
 
 class Times(NamedTuple):
-    """A column of times.
+    """A column of times."""
 
-    Attributes:
-        seconds: since the first that is one, shape (N,); NaN where the cell is empty, infinite
-            where it is not understood.
-        clock: that they are counted on.
-        wrong: first cell that is not understood, else the first empty one.
-        note: how they were read, empty for the usual way.
-    """
-
+    # since the first that is one, shape (N,); NaN where the cell is empty, infinite where it is not
+    # understood
     seconds: FloatArray
-    clock: Clock
-    wrong: Wrong | None = None
-    note: str = ""
+    clock: Clock  # that they are counted on
+    wrong: Wrong | None = None  # first cell that is not understood, else the first empty one
+    note: str = ""  # how they were read, empty for the usual way
 
 
 class _Date(NamedTuple):
@@ -104,10 +89,7 @@ class _Date(NamedTuple):
 
 @dataclasses.dataclass
 class Stamps:
-    """A column of times as it grows; most cells of its first piece tell whether it is numbers.
-
-    The ``order`` of days and months may be said; None finds out.
-    """
+    """A column of times as it grows; days or months may come first in ``order``, None finds out."""
 
     decimal_comma: bool = False
     order: DateOrder | None = None

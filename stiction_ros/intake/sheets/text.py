@@ -33,14 +33,9 @@ REFUSED = (
 )
 """First bytes of files that are no text, what these are, and what helps."""
 
-HEAD = 4096
-"""Bytes by which the encoding is told."""
-
-SHORTEST = 16
-"""Bytes from which UTF-16 without its mark is told."""
-
-NULLS = 0.7
-"""Share of zero bytes on one side of the pairs from which text is UTF-16 without its mark."""
+HEAD = 4096  # bytes by which the encoding is told
+SHORTEST = 16  # bytes from which UTF-16 without its mark is told
+NULLS = 0.7  # share of zero bytes on one side of the pairs in UTF-16 without its mark
 
 
 def _as_western(error: UnicodeError) -> tuple[str, int]:
@@ -67,9 +62,6 @@ def magic(path: Path) -> bytes:
 @contextlib.contextmanager
 def open_text(path: Path) -> Iterator[io.TextIOBase]:
     """Open a text file, gzip or Zstandard unpacked: UTF-8, UTF-16, or Western European bytes.
-
-    Args:
-        path: the file; what it is packed in is told by its first bytes.
 
     Raises:
         InputError: no such file, no text, an archive, or packed data that is cut off, also

@@ -30,11 +30,7 @@ UNSTORED = re.compile(
 
 
 def open_sheets(path: Path) -> Sequence[Sheet]:
-    """Open the tables of a file, whatever kind it is; a workbook may hold several.
-
-    Raises:
-        InputError: it cannot be read, holds no table, or the package for it is missing.
-    """
+    """Open the tables of a file, whatever kind it is; a workbook may hold several."""
     first = text.magic(path)
     if first.startswith(text.PARQUET):
         return [ParquetSheet(path)]

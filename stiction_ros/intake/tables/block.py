@@ -34,25 +34,15 @@ class Key(NamedTuple):
 
 @dataclasses.dataclass
 class Column:
-    """One signal as it was read.
+    """One signal as it was read."""
 
-    Attributes:
-        name: of its column or tag.
-        values: shape (N,), NaN where there is no number; codes of words for a mode.
-        blank: where nothing stood, shape (N,).
-        wrong: the first cell that is no number.
-        words: what stood in the place of numbers, with its count.
-        unit: as the export says, empty when it does not.
-        known: words of a mode, by their codes.
-    """
-
-    name: str
-    values: FloatArray
-    blank: FlagArray
-    wrong: Wrong | None = None
-    words: Counter[str] = dataclasses.field(default_factory=Counter)
-    unit: str = ""
-    known: tuple[str, ...] = ()
+    name: str  # of its column or tag
+    values: FloatArray  # shape (N,), NaN where there is no number; codes of words for a mode
+    blank: FlagArray  # where nothing stood, shape (N,)
+    wrong: Wrong | None = None  # the first cell that is no number
+    words: Counter[str] = dataclasses.field(default_factory=Counter)  # in the place of numbers
+    unit: str = ""  # as the export says, empty when it does not
+    known: tuple[str, ...] = ()  # words of a mode, by their codes
 
     def rows(self, chosen: NDArray[np.intp] | FlagArray) -> Column:
         """Return some of its rows."""
@@ -61,31 +51,18 @@ class Column:
 
 @dataclasses.dataclass
 class Block:
-    """Signals of a loop on one clock.
+    """Signals of a loop on one clock."""
 
-    Attributes:
-        path: of the file.
-        row_word: what a row is called in errors.
-        clock: of the times.
-        time: s since ``clock.start``, shape (N,), NaN where there is none.
-        lines: of the rows in the file, shape (N,).
-        columns: the signals.
-        mask: quality of each row as the file says it, None when it does not.
-        notes: how it was read.
-        stray: the first time that is none, as an error says it; empty for none.
-        mended: what was wrong with the table and is put right, in sentences.
-    """
-
-    path: Path
-    row_word: str
-    clock: Clock
-    time: FloatArray
-    lines: NDArray[np.int64]
-    columns: dict[Key, Column]
-    mask: QualityArray | None = None
-    notes: tuple[str, ...] = ()
-    stray: str = ""
-    mended: tuple[str, ...] = ()
+    path: Path  # of the file
+    row_word: str  # what a row is called in errors
+    clock: Clock  # of the times
+    time: FloatArray  # s since ``clock.start``, shape (N,), NaN where there is none
+    lines: NDArray[np.int64]  # of the rows in the file, shape (N,)
+    columns: dict[Key, Column]  # the signals
+    mask: QualityArray | None = None  # quality of each row, None when the file does not say it
+    notes: tuple[str, ...] = ()  # how it was read
+    stray: str = ""  # the first time that is none, as an error says it; empty for none
+    mended: tuple[str, ...] = ()  # what was wrong with the table and is put right, in sentences
 
     def of(self, *signals: str) -> dict[Key, Column]:
         """Return the columns of some signals, in their order."""

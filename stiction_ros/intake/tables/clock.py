@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -11,26 +12,17 @@ import numpy as np
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import SECONDS, IntakeOptions, TimeUnit, known_time_unit
-from stiction_ros.intake.sheets.cells import Cells
-from stiction_ros.intake.sheets.names import OR_ROW, TIME_NAMES
+from stiction_ros.intake.sheets.cells import Cells, is_number
+from stiction_ros.intake.sheets.names import OR_ROW, TIME_NAMES, read_tag
 from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.stamps import Clock, Times, is_stamp
 from stiction_ros.records.parts import DATES
 
-DATED = (DATES, 4e9)
-"""Seconds since 1970 that are taken for dates: 1979 to 2096."""
-
-SPREADSHEET = (25569.0, 73050.0)
-"""Days since the last of 1899 in which spreadsheets count 1970 to 2099."""
-
-LONG = 500.0
-"""Steps from which a number that is no multiple of a minute is perhaps in milliseconds, s."""
-
-DAY_LONG = 14400.0
-"""Steps from which any number is perhaps in milliseconds, s: nobody keeps a loop each 4 h."""
-
-SHORT = 0.05
-"""Step, as a number, below which times as large as a spreadsheet's days may be such days."""
+DATED = (DATES, 4e9)  # seconds since 1970 that are taken for dates: 1979 to 2096
+SPREADSHEET = (25569.0, 73050.0)  # days since the last of 1899, for 1970 to 2099
+LONG = 500.0  # s; longer steps that are no multiple of a minute may be milliseconds
+DAY_LONG = 14400.0  # s; longer steps may be milliseconds: nobody keeps a loop each 4 h
+SHORT = 0.05  # a number; shorter steps of large times may be days of a spreadsheet
 
 _MIDNIGHT = re.compile(r"[T ]0?0:00(:00(\.0+)?)?$")
 
@@ -49,16 +41,11 @@ class TimeColumn(NamedTuple):
         return [f"{_MIDNIGHT.sub('', str(date))} {clock}".strip() for date, clock in pairs]
 
 
-ROWS_APART = TimeColumn(-1)
-"""That of a table whose rows are a sample time apart, without times."""
+ROWS_APART = TimeColumn(-1)  # that of a table whose rows are a sample time apart, without times
 
 
 def time_column(sheet: Sheet, name: str | None) -> TimeColumn:
-    """Return the column of times: the one named, or the first with a usual name.
-
-    Raises:
-        InputError: there is none.
-    """
+    """Return the column of times: the one named, or the first with a usual name."""
     if name is not None:
         return TimeColumn(sheet.column(name, "--time COLUMN"))
     for date, clock in itertools.product(("date", "datum"), ("time", "zeit", "uhrzeit")):
@@ -119,3 +106,29 @@ def _scaled(times: Times, unit: TimeUnit, note: str) -> Times:
     dated = DATED[0] <= start <= DATED[1]
     clock = Clock(start, dated, dated and unit is not TimeUnit.DAYS)
     return times._replace(seconds=seconds, clock=clock, note=note)
+
+
+def kind_of(cells: Cells) -> str:
+    """Return what most cells of a column are: stamp, number, text; empty when nothing is there."""
+    if isinstance(cells, np.ndarray):
+        return "stamp" if cells.dtype.kind == "M" else "number"
+    counts = Counter(
+        "stamp" if is_stamp(cell) else "number" if is_number(cell) else "text"
+        for cell in cells[:: max(len(cells) // 100, 1)]
+        if cell.strip()
+    )
+    return counts.most_common(1)[0][0] if counts else ""
+
+
+def repeats(cells: Cells) -> bool:
+    """Return whether each cell of a column is there twice on average."""
+    return 2 * len(set(cells)) <= len(cells)
+
+
+def is_clock(name: str, cells: Cells) -> bool:
+    """Return whether a column holds stamps, or numbers under the name of a time."""
+    if (told := read_tag(name)) is not None and not told.quality:
+        return False
+    kind = kind_of(cells)
+    bare = re.sub(r"[\s._(#-]*\d*\)?$", "", name).casefold()
+    return kind == "stamp" or (kind == "number" and bare in TIME_NAMES)

@@ -11,17 +11,10 @@ import numpy as np
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import IntakeOptions
+from stiction_ros.intake.sheets import names as tag_names
 from stiction_ros.intake.sheets.cells import Cells, Numbers, Words
-from stiction_ros.intake.sheets.names import (
-    TAG_NAMES,
-    TIME_NAMES,
-    UNIT_NAMES,
-    VALUE_NAMES,
-    read_tag,
-)
 from stiction_ros.intake.sheets.sheet import Sheet
-from stiction_ros.intake.tables.clock import TimeColumn, time_column
-from stiction_ros.intake.tables.kinds import is_clock, kind_of, repeats
+from stiction_ros.intake.tables.clock import TimeColumn, is_clock, kind_of, repeats, time_column
 from stiction_ros.intake.tables.qualities import quality_places
 from stiction_ros.intake.tables.tags import TagList
 
@@ -44,14 +37,14 @@ def one_value(
     there: texts that name signals, stamps, numbers; refused where several may hold the values.
     """
     named = options.columns.time
-    unit = _first(sheet, UNIT_NAMES)
+    unit = _first(sheet, tag_names.UNIT_NAMES)
     if options.long is not None:
         tag, time, value = (sheet.column(name, "--long TAG,TIME,VALUE") for name in options.long)
         return OneValue(tag, TimeColumn(time), value, unit)
-    usual = _first(sheet, TAG_NAMES), _first(sheet, VALUE_NAMES)
+    usual = _first(sheet, tag_names.TAG_NAMES), _first(sheet, tag_names.VALUE_NAMES)
     if usual[0] is not None and usual[1] is not None and usual[0] != usual[1]:
         return OneValue(usual[0], time_column(sheet, named), usual[1], unit)
-    header, read = sheet.layout.header, read_tag if tags is None else tags.read
+    header, read = sheet.layout.header, tag_names.read_tag if tags is None else tags.read
     if any(told.loop or told.signal in ("op", "pv") for told in map(read, header) if told):
         return None
     kinds = list(map(kind_of, top))
@@ -63,7 +56,7 @@ def one_value(
     of_tags = [k for k in texts if any(t.loop for t in map(read, set(top[k])) if t)]
     if not stamps or (not of_tags and (len(texts) != 1 or read(sheet.name))):
         return None
-    listed = any(header[k].casefold() in TIME_NAMES for k in stamps)
+    listed = any(header[k].casefold() in tag_names.TIME_NAMES for k in stamps)
     clock = time_column(sheet, named) if named or listed else TimeColumn(stamps[0])
     place = (of_tags or texts)[0]
     other = beside | {clock.place}
@@ -95,7 +88,7 @@ def _is_count(cells: Cells, names: Cells) -> bool:
 def _is_value(name: str) -> bool:
     """Return whether a part of a name says value: ``VarValue``, ``IP_TREND_VALUE``."""
     parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[^\W\d_A-Z]+", name)
-    return any(part.casefold() in VALUE_NAMES for part in parts)
+    return any(part.casefold() in tag_names.VALUE_NAMES for part in parts)
 
 
 def _first(sheet: Sheet, names: tuple[str, ...]) -> int | None:

@@ -14,15 +14,13 @@ from stiction_ros.intake.sheets.cells import Cells
 from stiction_ros.intake.sheets.names import OR_ROW, VALUE_NAMES, Tag, folded, read_tag
 from stiction_ros.intake.sheets.sheet import Sheet, stem
 from stiction_ros.intake.tables.block import Key
-from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, time_column
-from stiction_ros.intake.tables.kinds import is_clock
+from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, is_clock, time_column
 from stiction_ros.intake.tables.one_value import OneValue, one_value
 from stiction_ros.intake.tables.qualities import qualities_of, quality_places
 from stiction_ros.intake.tables.tags import TagList
-from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
+from stiction_ros.records.csv_writer import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
 
-LOOKED_AT = 1000
-"""Rows by which it is told what stands in a column."""
+LOOKED_AT = 1000  # rows by which it is told what stands in a column
 
 
 class Shape(enum.Enum):
@@ -35,37 +33,22 @@ class Shape(enum.Enum):
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Which column is what.
+    """Which column is what."""
 
-    Attributes:
-        shape: of the table.
-        time: column of the times; its place is -1 where rows are a sample time apart.
-        own: column of a signal to its own column of times, empty where one is of all.
-        loops: name of each loop to its signals' columns; of a long table empty.
-        quality: column of a signal to the columns of its quality.
-        whole_quality: columns with the quality of whole rows.
-        long: columns of a table with one value a row.
-        named: whether the user named the columns.
-        notes: what was left out.
-    """
-
-    shape: Shape
-    time: TimeColumn
-    loops: Mapping[str, Mapping[Key, int]]
-    own: Mapping[int, TimeColumn] = dataclasses.field(default_factory=dict)
+    shape: Shape  # of the table
+    time: TimeColumn  # column of the times; its place is -1 where rows are a sample time apart
+    loops: Mapping[str, Mapping[Key, int]]  # loop to its signals' columns; empty for a long table
+    own: Mapping[int, TimeColumn] = dataclasses.field(default_factory=dict)  # where not of all
+    # column of a signal to the columns of its quality
     quality: Mapping[int, tuple[int, ...]] = dataclasses.field(default_factory=dict)
-    whole_quality: tuple[int, ...] = ()
-    long: OneValue | None = None
-    named: bool = False
-    notes: tuple[str, ...] = ()
+    whole_quality: tuple[int, ...] = ()  # columns with the quality of whole rows
+    long: OneValue | None = None  # columns of a table with one value a row
+    named: bool = False  # whether the user named the columns
+    notes: tuple[str, ...] = ()  # what was left out
 
 
 def plan_of(sheet: Sheet, options: IntakeOptions, tags: TagList | None) -> Plan:
-    """Return what the columns of a table are.
-
-    Raises:
-        InputError: a column is missing or there twice, or the options do not fit.
-    """
+    """Return what the columns of a table are; InputError for missing or repeated ones."""
     empty: Sequence[Cells] = [[] for _ in sheet.layout.header]
     top = next((columns for columns, _ in sheet.pieces(LOOKED_AT)), empty)
     if options.long is None and (options.columns.op or options.columns.pv):
@@ -177,11 +160,7 @@ def _own_times(
 
 
 def _refuse_missing(
-    sheet: Sheet,
-    op: Iterable[str],
-    pv: Iterable[str],
-    options: IntakeOptions,
-    top: Sequence[Cells],
+    sheet: Sheet, op: Iterable[str], pv: Iterable[str], options: IntakeOptions, top: Sequence[Cells]
 ) -> None:
     """Raise where several of OP, PV and the time are missing, with all that is to be said."""
     wanted = [("op", name) for name in op] + [("pv", name) for name in pv]

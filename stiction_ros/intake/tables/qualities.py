@@ -10,7 +10,7 @@ import numpy as np
 
 from stiction_ros.intake.sheets.cells import BAD_WORDS, Cells, Words, number
 from stiction_ros.intake.sheets.names import folded, quality_kind, read_tag, without_quality
-from stiction_ros.intake.tables.kinds import kind_of, repeats
+from stiction_ros.intake.tables.clock import kind_of, repeats
 from stiction_ros.intake.words import WORDS, pattern_of
 
 _BAD, _GOOD = tuple(WORDS["bad_beginnings"]), pattern_of("good_words")
@@ -18,10 +18,7 @@ _YES, _NO = tuple(WORDS["yes_words"]), tuple(WORDS["no_words"])
 
 
 def bad_qualities(read: Words, name: str) -> tuple[set[str], str]:
-    """Return which words of a column of qualities tell of bad values, and a note on others.
-
-    Its ``name`` tells what a number or a yes means.
-    """
+    """Return which words of a column of qualities, by its name, are bad, and a note on others."""
     kind = quality_kind(name) or "code"
     told = {word: word.strip().casefold() for word in read.known if word.strip()}
     codes = {word: code for word, text in told.items() if (code := number(text)) is not None}
@@ -99,10 +96,7 @@ def _is_bad(text: str, kind: str) -> bool | None:
 
 
 def _bad_codes(codes: dict[str, float], kind: str) -> dict[str, bool | None]:
-    """Return which numbers tell of bad values; None for those not known.
-
-    A value that is surer to be bad than good, below half of the whole, is bad.
-    """
+    """Return which numbers tell of bad values; None for those not known."""
     most = max(codes.values(), default=0.0)
     if kind in ("good", "bad"):
         return {word: (code != 0.0) == (kind == "bad") for word, code in codes.items()}

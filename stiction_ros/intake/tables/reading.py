@@ -22,7 +22,7 @@ from stiction_ros.intake.tables.one_value import OneValue
 from stiction_ros.intake.tables.plan import Plan
 from stiction_ros.intake.tables.qualities import bad_qualities
 from stiction_ros.intake.tables.tags import TagList
-from stiction_ros.records.csv_names import QUALITY
+from stiction_ros.records.csv_writer import QUALITY
 from stiction_ros.records.quality import QUALITY_WORDS, QualityArray
 
 Reader = tuple[int, Numbers] | tuple[int, Words]
@@ -31,11 +31,7 @@ Reader = tuple[int, Numbers] | tuple[int, Words]
 def blocks_of(
     sheet: Sheet, plan: Plan, options: IntakeOptions, tags: TagList | None
 ) -> dict[str, list[Block]]:
-    """Read a table into blocks, by the name of their loop.
-
-    Raises:
-        InputError: times that cannot be read, or the file is damaged.
-    """
+    """Read a table into blocks, by the name of their loop."""
     if plan.long is not None:
         return _long(sheet, plan, plan.long, options, tags)
     return _beside(sheet, plan, options)

@@ -14,28 +14,19 @@ from stiction_ros.intake.sheets.stamps import DateOrder
 from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.intake.words import WORDS
 
-LONGEST = 1e9
-"""Sample time that is none any more, s."""
+LONGEST = 1e9  # sample time that is none any more, s
 
 
 @dataclasses.dataclass(frozen=True)
 class TagRow:
-    """A row of a tag list.
+    """A row of a tag list."""
 
-    Attributes:
-        where: list and line.
-        loop: its name.
-        tags: signal and tag of each that it names.
-        unit: of OP; None where the row does not say it.
-        file: for which it counts alone, a name or the end of a path; empty for all.
-        options: what it says of that file: a column ``time``, and fields of the options.
-    """
-
-    where: str
-    loop: str
-    tags: tuple[tuple[str, str], ...]
-    unit: OpUnit | None = None
-    file: str = ""
+    where: str  # list and line
+    loop: str  # its name
+    tags: tuple[tuple[str, str], ...]  # signal and tag of each that it names
+    unit: OpUnit | None = None  # of OP; None where the row does not say it
+    file: str = ""  # for which it counts alone, a name or the end of a path; empty for all
+    # what it says of that file: a column ``time``, and fields of the options
     options: Mapping[str, object] = dataclasses.field(default_factory=dict)
 
     @property

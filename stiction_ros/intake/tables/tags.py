@@ -38,18 +38,12 @@ class FileWay:
 
 @dataclasses.dataclass(frozen=True)
 class TagList:
-    """Which tags make up which loop.
+    """Which tags make up which loop."""
 
-    Attributes:
-        loops: name of the loop, signal, for each tag in small letters.
-        units: unit of OP of loops of which the list says it.
-        rows: rows that count for one file alone, by its name.
-        own: in the list of a file the tags that its rows name, by their small letters.
-    """
-
-    loops: Mapping[str, Tag]
-    units: Mapping[str, OpUnit]
-    rows: Mapping[str, Sequence[TagRow]] = dataclasses.field(default_factory=dict)
+    loops: Mapping[str, Tag]  # name of the loop, signal, for each tag in small letters
+    units: Mapping[str, OpUnit]  # unit of OP of loops of which the list says it
+    rows: Mapping[str, Sequence[TagRow]] = dataclasses.field(default_factory=dict)  # for one file
+    # in the list of a file the tags that its rows name, by their small letters
     own: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def read(self, name: str) -> Tag | None:
@@ -57,11 +51,7 @@ class TagList:
         return self.loops.get(folded(name))
 
     def way_of(self, path: Path, options: IntakeOptions) -> FileWay:
-        """Return how a file is read.
-
-        Raises:
-            InputError: its rows contradict each other, or have a tag twice.
-        """
+        """Return how a file is read; InputError if its rows contradict each other."""
         rows = self.rows_of(path)
         said: dict[str, Any] = {}
         for row in rows:
@@ -110,10 +100,6 @@ def read_tag_list(path: Path) -> TagList:
 
     A column ``op_unit`` may say ``percent``, ``share`` or ``ma``. A row with a ``file`` counts
     for that file alone, and may have ``time``, ``dates``, ``time_unit`` and ``sample_time``.
-    Other columns are ignored.
-
-    Raises:
-        InputError: it cannot be read, has other columns, or a tag twice.
     """
     with foreign(path):
         rows = read_rows(path)

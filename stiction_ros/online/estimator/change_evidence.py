@@ -26,17 +26,11 @@ MISMATCH = 0.08  # standard error of a share that no number of moves takes away
 
 @dataclasses.dataclass(frozen=True)
 class OutputReference:
-    """One output as it was known when trust began.
+    """One output as it was known when trust began."""
 
-    Attributes:
-        model: linear part.
-        ar: φ of the AR noise of its free run, shape (p ≤ 6,).
-        std: of the innovations behind the high-pass, units of the output.
-    """
-
-    model: OutputModel
-    ar: FloatArray
-    std: float
+    model: OutputModel  # linear part
+    ar: FloatArray  # φ of the AR noise of its free run, shape (p ≤ 6,)
+    std: float  # of the innovations behind the high-pass, units of the output
 
     @property
     def reach(self) -> int:
@@ -129,19 +123,12 @@ def _noise_of(
 
 @dataclasses.dataclass(frozen=True)
 class Share:
-    """How much of a signature a stretch of samples shows: 0 nothing of it, 1 all.
+    """How much of a signature a stretch of samples shows: 0 nothing of it, 1 all."""
 
-    Attributes:
-        value: by weighted least squares.
-        error: its standard error, from how the episodes of moves differ.
-        information: squared length of the signature, in σ.
-        episodes, moves: that the signature has in the stretch.
-    """
-
-    value: float
-    error: float
-    information: float
-    episodes: int
+    value: float  # by weighted least squares
+    error: float  # its standard error, from how the episodes of moves differ
+    information: float  # squared length of the signature, in σ
+    episodes: int  # episodes, moves: that the signature has in the stretch
     moves: int
 
     @property
@@ -192,12 +179,9 @@ class Evidence:
             self._gains.append(np.column_stack(gains))
 
     def stems(self, valve: int, first: int, grid: FloatArray) -> FloatArray:
-        """Return stems of ``valve`` from ``first`` on by its law, shape (n − first, G), %.
+        """Return stems of ``valve`` by its law from ``first`` on, shape (n − first, G), %.
 
-        Args:
-            valve: index.
-            first: sample at whose beginning the stem rests where it is trusted to be.
-            grid: rows (f_S, f_D), %, shape (G, 2).
+        There the stem rests where it is trusted to be; ``grid`` has rows (f_S, f_D), %, (G, 2).
         """
         law = self._laws[valve]
         further = [getattr(law, entry.attribute) for entry in law.parameters()[2:]]
@@ -206,12 +190,7 @@ class Evidence:
         return simulate(find_law(str(law.law)), grid, op, start, further)
 
     def signature(self, valve: int, stems: FloatArray) -> list[FloatArray]:
-        """Return what the stems of ``valve`` would change, per output, in σ.
-
-        Args:
-            valve: index.
-            stems: other positions, shape (n,) or (n, G), %.
-        """
+        """Return what other ``stems``, (n,) or (n, G), %, would change, per output, in σ."""
         trusted = self.stem[:, valve] if stems.ndim == 1 else self.stem[:, valve, None]
         name = self.reference.valves[valve]
         return [output.response(name, stems - trusted) for output in self.reference.outputs]
@@ -233,15 +212,9 @@ class Evidence:
         changes from different samples on is to be compared over the same rows: the gain that is
         left open explains a little by itself, and more where there are more rows.
 
-        Args:
-            valve: index.
-            first: sample.
-            stems: other positions from ``first`` on, shape (n − first, G), %.
-            begin: first of the samples that count, not above ``first``; None for ``first``.
-
-        Returns:
-            Log likelihoods over that of the trusted stems, shape (G,), and the mean squares of
-            the innovations that are left, shape (G,).
+        The ``stems`` from ``first`` on are of shape (n − first, G), %; ``begin`` ≤ ``first``.
+        Returned are log likelihoods over that of the trusted stems, (G,), and the mean squares of
+        the innovations that are left, shape (G,).
         """
         whole = np.repeat(self.stem[:, [valve]], stems.shape[1] + 1, axis=1)
         whole[first:, 1:] = stems  # the first column is what is trusted
@@ -264,11 +237,9 @@ class Evidence:
     def slope(
         self, signature: list[FloatArray], direction: list[FloatArray], first: int
     ) -> tuple[float, float] | None:
-        """Return how far along ``direction`` the innovations lie beyond ``signature``.
+        """Return how far along ``direction`` innovations lie beyond ``signature``, and the error.
 
-        Returns:
-            The step and its standard error, by least squares from sample ``first`` on with the
-            gains left open; None where the direction shows nowhere.
+        By least squares from sample ``first`` on, gains open; None where it shows nowhere.
         """
         top = bottom = 0.0
         for seen, change, along, gains in zip(

@@ -72,16 +72,11 @@ class ChangeRule:
 
 @dataclasses.dataclass(frozen=True)
 class LeadIn:
-    """Samples before a change, and where the stems were.
+    """Samples before a change, and where the stems were."""
 
-    Attributes:
-        op, stem: shape (n, m), %.
-        pv: shape (n, p).
-    """
-
-    op: FloatArray
+    op: FloatArray  # op, stem: shape (n, m), %
     stem: FloatArray
-    pv: FloatArray
+    pv: FloatArray  # shape (n, p)
 
     @classmethod
     def last_of(cls, op: FloatArray, stem: FloatArray, pv: FloatArray) -> LeadIn:
@@ -91,26 +86,16 @@ class LeadIn:
 
 @dataclasses.dataclass(frozen=True)
 class FrictionChange:
-    """The verdict on one valve.
+    """The verdict on one valve."""
 
-    Attributes:
-        status: unchanged, serviced or changed.
-        valve: tag.
-        samples: samples of the window that follow the change; 0 when unchanged.
-        friction: the new one, with intervals; None when unchanged or serviced.
-        doubted: whether the window speaks against the trusted friction, if not enough.
-        explained: whether process and trusted friction explain the window as they should.
-        share: of the new friction's signature, None where nothing was measured.
-        before: the window up to the change, None when unchanged.
-    """
-
-    status: ChangeStatus
-    valve: str
-    samples: int = 0
-    friction: TrustedFriction | None = None
-    doubted: bool = False
-    explained: bool = False
-    share: Share | None = None
+    status: ChangeStatus  # unchanged, serviced or changed
+    valve: str  # tag
+    samples: int = 0  # samples of the window that follow the change; 0 when unchanged
+    friction: TrustedFriction | None = None  # with intervals; None when unchanged or serviced
+    doubted: bool = False  # whether the window speaks against the trusted friction, if not enough
+    explained: bool = False  # whether process and trusted friction explain the window
+    share: Share | None = None  # of the new friction's signature, None where nothing was measured
+    # the window up to the change, None when unchanged
     before: LeadIn | None = dataclasses.field(default=None, compare=False, repr=False)
 
 
@@ -155,11 +140,7 @@ def static_interval(
 ) -> Interval:
     """Return the values of f_S, %, that the samples from ``first`` on do not reject.
 
-    Args:
-        evidence: of the window.
-        valve: index.
-        first: sample before which the stems are as trusted.
-        friction: f_S in whose neighbourhood is looked, and f_D.
+    Before, the stems are as trusted. It is looked near the f_S of ``friction``, with its f_D.
     """
     static, dynamic = friction
     grid = np.column_stack([static * FINE_SHARES, np.full(len(FINE_SHARES), dynamic)])
@@ -201,10 +182,7 @@ def _serviced(rule: ChangeRule, evidence: Evidence, valve: int) -> tuple[_Found,
 
 
 def _grown(evidence: Evidence, valve: int, trusted: TrustedFriction) -> tuple[_Found, float]:
-    """Return the friction that explains bursts of innovations best, and how well near ones do.
-
-    All beginnings are held against the same samples, those from the earliest of them on.
-    """
+    """Return the friction that explains bursts of innovations best, and how well near ones do."""
     starts = _starts(evidence, valve)
     known = (trusted.static_friction, trusted.dynamic_friction)
     low, high = ((1 - NEAR) * trusted.static_interval[0], (1 + NEAR) * trusted.static_interval[1])
@@ -246,10 +224,7 @@ def _starts(evidence: Evidence, valve: int) -> list[int]:
 def _gains(
     evidence: Evidence, valve: int, first: int, grid: FloatArray, begin: int | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return log likelihoods of frictions from ``first`` on, and the mean squares they leave.
-
-    Both over the samples from ``begin`` on, None for ``first``.
-    """
+    """Return log likelihoods of frictions from ``first`` on, and the mean squares they leave."""
     stems = evidence.stems(valve, first, grid)
     keys = np.random.default_rng(0).standard_normal(len(stems)) @ stems
     _, chosen, back = np.unique(keys, return_index=True, return_inverse=True)
@@ -260,14 +235,7 @@ def _gains(
 def narrowed(
     evidence: Evidence, valve: int, friction: TrustedFriction, *, whole: bool
 ) -> TrustedFriction:
-    """Return ``friction`` as the moves of the window tell it.
-
-    Args:
-        evidence: of the window, all of it behind the change.
-        valve: index.
-        friction: trusted so far.
-        whole: whether the window holds every move since the change.
-    """
+    """Return ``friction`` as a window behind the change tells it; ``whole`` with every move."""
     first = evidence.first or min(START_ROWS, len(evidence.op) // 2)
     known = (friction.static_friction, friction.dynamic_friction)
     best, error = _best(evidence, valve, first, known)
@@ -278,10 +246,7 @@ def narrowed(
 def _best(
     evidence: Evidence, valve: int, first: int, near: tuple[float, float]
 ) -> tuple[tuple[float, float], float]:
-    """Return f_S and f_D, looked for about ``near``, and the standard error of f_D, %.
-
-    What is there already is kept where nothing else is clearly better.
-    """
+    """Return f_S and f_D, looked for about ``near``, and the standard error of f_D, %."""
     grid = np.vstack([near, _grid(*near, FINE_SHARES)])
     gains, _ = _gains(evidence, valve, first, grid)
     better = gains.max() > gains[0] + _slack(float(gains.max() - gains[0]))
@@ -298,11 +263,7 @@ def _grid(static: float, dynamic: float, shares: FloatArray) -> FloatArray:
 
 
 def _changed(
-    rule: ChangeRule,
-    evidence: Evidence,
-    valve: int,
-    found: _Found,
-    trusted: TrustedFriction,
+    rule: ChangeRule, evidence: Evidence, valve: int, found: _Found, trusted: TrustedFriction
 ) -> FrictionChange | None:
     """Return the change to ``found``, its f_D refined; None where it does not stand up."""
     first = found.first
@@ -376,10 +337,7 @@ def _dynamic_step(
 def _rivals(
     evidence: Evidence, valve: int, trusted: TrustedFriction, first: int
 ) -> tuple[float, float]:
-    """Return the best log likelihoods from ``first`` on of little friction, and of more.
-
-    A stem that is at OP is little friction, though not every law has it there without friction.
-    """
+    """Return the best log likelihoods from ``first`` on of little friction, and of more."""
     little = np.array([(s, s * d) for s in LOW_STATIC for d in LOW_DYNAMIC])
     more = np.array([(s, d * s) for s in STATIC_SHARES for d in (0.0, 0.1, 0.25, 0.5, 0.75, 1.0)])
     gains = [

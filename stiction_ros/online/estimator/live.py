@@ -12,12 +12,7 @@ import numpy as np
 from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.identification import (
-    Identification,
-    IdentificationOptions,
-    OutputModel,
-    identify,
-)
+from stiction_ros.identification import Identification, IdentificationOptions, OutputModel, identify
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import AUTO
 from stiction_ros.loop import LoopModel
@@ -35,13 +30,11 @@ from stiction_ros.online.schedule import FitSchedule
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
 
-METHOD = "exact"
-"""Search of the windows: a sliding window is fitted again and again, beside a loop that runs."""
+METHOD = "exact"  # a sliding window is fitted again and again, beside a loop that runs
 
 LAWS = ("he", "kano", "choudhury", "xch", "semi_physical", AUTO)
 
-LAW_METHOD = "evidence"
-"""Search that tells a law which is left open."""
+LAW_METHOD = "evidence"  # search that tells a law which is left open
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,11 +59,7 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
         return (LAW_METHOD, METHOD) if self.law == AUTO else (METHOD,)
 
     def options(self) -> IdentificationOptions:
-        """Return what :func:`stiction_ros.identification.identify` is asked.
-
-        Raises:
-            InputError: no such law, or one that cannot be followed sample by sample.
-        """
+        """Return the options of ``identify``; a law that has no steps is refused."""
         if self.law != AUTO and find_law(self.law).switching is None:
             raise InputError(
                 f"{self.law} is not identified in a running loop: every slip hangs on the one "
@@ -90,20 +79,14 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
 
 @dataclasses.dataclass(frozen=True)
 class FitUpdate:
-    """What one fit says and changes.
+    """What one fit says and changes."""
 
-    Attributes:
-        end: last sample of the window.
-        identification: the fit itself.
-        trusted: trusted friction by valve after this fit.
-        loop_model: the loop with the trusted friction, only when it differs from before.
-        changes: what the window says of changes of the friction trusted before, by valve.
-    """
-
-    end: int
-    identification: Identification
-    trusted: Mapping[str, TrustedFriction]
+    end: int  # last sample of the window
+    identification: Identification  # the fit itself
+    trusted: Mapping[str, TrustedFriction]  # trusted friction by valve after this fit
+    # the loop with the trusted friction, only when it differs from before
     loop_model: LoopModel | None
+    # what the window says of changes of the friction trusted before, by valve
     changes: tuple[FrictionChange, ...] = ()
 
 
@@ -150,11 +133,7 @@ class LiveEstimator:
         outputs: Sequence[str],
         sample_time: float,
     ) -> None:
-        """Start with an empty window.
-
-        Raises:
-            InputError: settings that no fit can use.
-        """
+        """Start with an empty window; settings that no fit can use are refused."""
         settings.options()
         self.settings = settings
         self.loop, self.sample_time = loop, sample_time
@@ -172,11 +151,7 @@ class LiveEstimator:
         self._changed: dict[str, _Change] = {}
 
     def retune(self, settings: EstimatorSettings) -> None:
-        """Change settings from the next sample on; window and trust are kept.
-
-        Raises:
-            InputError: settings that no fit can use; the old ones stay in force.
-        """
+        """Change settings from the next sample on; window and trust are kept, also when refused."""
         settings.options()
         self.settings = settings
         self._trust.retune(settings)
@@ -192,10 +167,7 @@ class LiveEstimator:
         return dataclasses.replace(self.settings, law=min(laws)).options()
 
     def add(self, sample: int, op: FloatArray, pv: FloatArray) -> Record | None:
-        """Take in one sample, OP (m,) and PV (p,); return the window when a fit is due.
-
-        No window holds a sample that is not finite: it begins anew behind it.
-        """
+        """Take in one sample, OP (m,) and PV (p,); return a window of finite ones if due."""
         self._last = sample
         if np.isfinite(op).all() and np.isfinite(pv).all():
             self._op.append(np.array(op, dtype=float))

@@ -80,12 +80,9 @@ class TrustedFriction:
     def narrowed(
         self, static: Interval, dynamic: float, dynamic_interval: Interval, *, anew: bool
     ) -> Self:
-        """Return the friction as the moves since it changed tell it.
+        """Return the friction as the moves since it changed tell it, all of them if ``anew``.
 
-        Args:
-            static, dynamic_interval: intervals that these moves allow.
-            dynamic: f_D, taken only where the one in force lies outside its interval.
-            anew: whether the moves are all since the change, so that they say it all.
+        Their intervals are given, and f_D, taken only where the one in force lies outside its own.
         """
         both = static if anew else _intersect(self.static_interval, static) or static
         settled = both[1] <= SETTLED * both[0]
@@ -125,10 +122,7 @@ class ValveTrust:
         self._disjoint_verdict: VerdictKind | None = None
 
     def update(self, estimate: ValveEstimate, firm: bool = False) -> TrustedFriction | None:
-        """Take in the estimate of one more window and return what is trusted now.
-
-        A ``firm`` trust is narrowed, but not replaced.
-        """
+        """Take in the estimate of one more window, which only narrows a ``firm`` trust."""
         found = TrustedFriction.of(estimate, self.rule.tolerance)
         if self.trusted is not None:
             self._revise(found, estimate.verdict, firm)
@@ -218,10 +212,7 @@ def alike(one: Mapping[str, TrustedFriction], other: Mapping[str, TrustedFrictio
 
 
 def _combine(old: TrustedFriction, new: TrustedFriction) -> TrustedFriction | None:
-    """Return the intersection, the old point kept where it still fits; None when disjoint.
-
-    Frictions of two laws are two frictions.
-    """
+    """Return the intersection, the old point kept where it still fits; None when disjoint."""
     if old.law != new.law:
         return None
     static = _intersect(old.static_interval, new.static_interval)

@@ -67,10 +67,7 @@ class FitWorker:
             return self._pool.submit(work, *arguments)
 
     def close(self) -> None:
-        """Drop queued fits and end the process once the running one is done.
-
-        Compilation is no fit: nobody waits for it.
-        """
+        """Drop queued fits and end the process after the running one, if it is a fit."""
         if not self._compiled.done():
             for process in self._processes:
                 process.kill()

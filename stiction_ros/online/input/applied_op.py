@@ -13,17 +13,12 @@ SILENT = 10  # samples without a word after which nobody tells any more
 
 @dataclasses.dataclass(frozen=True)
 class Given:
-    """What the valves were given at one sample.
+    """What the valves were given at one sample."""
 
-    Attributes:
-        op: shape (m,), %; None when nobody tells.
-        known: whether it is known; without ``op`` it is then the controller's own OP.
-        ours: whether it comes from the controller, as limited or as late as it may be, and not
-            from someone else who has the valves.
-    """
-
-    op: FloatArray | None = None
-    known: bool = True
+    op: FloatArray | None = None  # shape (m,), %; None when nobody tells
+    known: bool = True  # whether it is known; without ``op`` it is then the controller's own OP
+    # whether it comes from the controller, as limited or as late as it may be, and not from someone
+    # else who has the valves
     ours: bool = True
 
 
@@ -50,11 +45,9 @@ class AppliedOp:
         return self._told[max(found)].op if found else None
 
     def before(self, stamp: int, own_in_time: bool) -> Given:
-        """Return what was given at the sample before that of ``stamp``, and forget older ones.
+        """Return what was given at the sample before that of ``stamp``, ns, and forget older ones.
 
-        Args:
-            stamp: ns.
-            own_in_time: whether the controller's OP for that sample went out within a period.
+        The controller's ``own`` OP may have gone out within a period, or later.
         """
         half = self._step // 2
         wanted = [told for told in self._told if abs(told - stamp + self._step) <= half]

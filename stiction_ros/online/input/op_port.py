@@ -17,10 +17,8 @@ class Reception(enum.Enum):
     """What became of one OP."""
 
     TAKEN = "taken"
-    LATE = "late"
-    """Taken, though its sample had passed."""
-    REPEATED = "repeated"
-    """Not newer than the last one taken: the first OP of a sample wins."""
+    LATE = "late"  # taken, though its sample had passed
+    REPEATED = "repeated"  # not newer than the last one taken: the first OP of a sample wins
     NAME = "name"
     TAGS = "tags"
     NUMBER = "number"
@@ -30,17 +28,11 @@ class Reception(enum.Enum):
 
 @dataclasses.dataclass(frozen=True)
 class CommandRules:
-    """What a plant or driver asks of an OP.
+    """What a plant or driver asks of an OP."""
 
-    Attributes:
-        commander: full name of the only node that may command; empty for the first that does.
-        step: from one sample to the next, ns.
-        exact: only the OP that bears the stamp of the present sample is taken (lockstep).
-    """
-
-    commander: str
-    step: int
-    exact: bool
+    commander: str  # full name of the only node that may command; empty for the first that does
+    step: int  # from one sample to the next, ns
+    exact: bool  # only the OP that bears the stamp of the present sample is taken (lockstep)
 
 
 class OpPort:
@@ -59,14 +51,7 @@ class OpPort:
         self._last: int | None = None
 
     def judge(self, sender: str, stamp: int, op: FloatArray | None, present: int) -> Reception:
-        """Return whether an OP is taken.
-
-        Args:
-            sender: full name that it bears; empty when it bears none.
-            stamp: of the sample that it is for, ns.
-            op: shape (m,), or None when it has not a value for each valve.
-            present: stamp of the present sample, ns.
-        """
+        """Return whether an OP, None for a wrong one, is taken for a ``stamp``, ns."""
         found = self._reception(sender, stamp, op, present)
         self.counts[found] += 1
         if found in (Reception.TAKEN, Reception.LATE):

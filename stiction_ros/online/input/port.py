@@ -138,10 +138,7 @@ class InputPort:
         return self._begin(now, arrived[-1])
 
     def overdue(self, now: float) -> tuple[Sample, ...]:
-        """Return samples whose PV should have come by ``now`` and has not, the last answered.
-
-        To be called regularly, several times in a sample or every 20 ms.
-        """
+        """Return samples whose PV should have come by ``now``; ask several times a sample."""
         if self.rules.lockstep or not self._begun:
             return ()
         period = self._pace.period

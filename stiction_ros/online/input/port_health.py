@@ -49,12 +49,7 @@ class PortHealth:
         self._before: Counter[str] = Counter()
 
     def look(self, state: PortState, running: float) -> list[Notice]:
-        """Return what to notice.
-
-        Args:
-            state: of the port.
-            running: s since the node runs, which stands for the age of what never came.
-        """
+        """Return what to notice; what never came is as old as the node, ``running`` s."""
         found = []
         longest = LOCKSTEP if self._lockstep else max(STOPPED * state.period, LEAST)
         age = min(state.ages.get("pv", running), running)

@@ -62,12 +62,7 @@ class Succession:
         self._last, self._count = None, 0
 
     def add(self, stamp: int, follows: bool) -> bool:
-        """Count a refused stamp; tell whether it is that of a new run.
-
-        Args:
-            stamp: ns.
-            follows: whether it may come that long after the one before by the receiver's clock.
-        """
+        """Count a refused stamp, ns; tell whether it is that of a new run."""
         last = self._last
         rises = last is not None and (stamp > last or (self._standing and stamp == last))
         self._count = self._count + 1 if rises and follows else 1

@@ -17,14 +17,9 @@ class SetPointPreview:
     values: FloatArray
 
     def ahead(self, sp: FloatArray, stamp: int, step: int, samples: int) -> FloatArray:
-        """Return the set-points of the next samples, shape (samples, p).
+        """Return the set-points of the next samples, shape (samples, p), from one ``step``, ns, on.
 
-        Each holds until the stamp of the next.
-
-        Args:
-            sp: set-points of now, shape (p,), which hold until the first stamp.
-            stamp, step: of the present sample, and from one to the next, ns.
-            samples: how many.
+        Each holds until the stamp of the next; those of now, ``sp``, hold until the first.
         """
         times = stamp + step * np.arange(1, samples + 1)
         # What a preview says of the past is over: sp of now is newer.

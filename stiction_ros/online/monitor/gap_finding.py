@@ -6,13 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from stiction_ros.discrepancy import (
-    Discrepancy,
-    FoundEffect,
-    GapOptions,
-    GapVerdict,
-    find_discrepancy,
-)
+from stiction_ros import discrepancy
 from stiction_ros.effects import behaviours
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
@@ -20,22 +14,15 @@ from stiction_ros.records import Record
 
 @dataclasses.dataclass(frozen=True)
 class GapFinding:
-    """What was found in one window.
+    """What was found in one window."""
 
-    Attributes:
-        begin, end: first and last sample of the window, counted from the first of the run.
-        verdict: None when the window could not be used.
-        text: one sentence.
-        effects: each in a few words.
-        document: the mapping of ``gap --json`` without ``model_before`` and ``seconds``; its
-            times are seconds since ``begin``.
-    """
-
-    begin: int
+    begin: int  # begin, end: first and last sample of the window, counted from the first of the run
     end: int
-    verdict: GapVerdict | None
-    text: str
-    effects: tuple[str, ...]
+    verdict: discrepancy.GapVerdict | None  # None when the window could not be used
+    text: str  # one sentence
+    effects: tuple[str, ...]  # each in a few words
+    # the mapping of ``gap --json`` without ``model_before`` and ``seconds``; its times are seconds
+    # since ``begin``
     document: Mapping[str, Any]
 
     @property
@@ -56,16 +43,8 @@ class GapFinding:
 
 
 def find_in_window(model: LoopModel, record: Record) -> GapFinding:
-    """Run the workflow, without bootstraps, on a window of a running loop.
-
-    Args:
-        model: the loop as it is known.
-        record: the window; its ``start`` counts from the first sample of the run.
-
-    Raises:
-        InputError: as :func:`stiction_ros.discrepancy.find_discrepancy`.
-    """
-    found = find_discrepancy(model, [record], GapOptions(quick=True))
+    """Run the workflow, without bootstraps, on a window; its ``start`` counts from sample 0."""
+    found = discrepancy.find_discrepancy(model, [record], discrepancy.GapOptions(quick=True))
     effects = tuple(_effect(effect, record.start) for effect in found.effects)
     begin = round(record.start / record.sample_time)
     document = found.to_dict()
@@ -81,7 +60,7 @@ def standing(old: GapFinding | None, new: GapFinding) -> GapFinding:
 
     An effect may have left the later window: one that shows nothing takes nothing back.
     """
-    silent = new.verdict in (None, GapVerdict.NONE, GapVerdict.UNTESTABLE)
+    silent = new.verdict in (None, discrepancy.GapVerdict.NONE, discrepancy.GapVerdict.UNTESTABLE)
     return old if old is not None and silent else new
 
 
@@ -90,12 +69,12 @@ def unusable(begin: int, end: int, reason: str) -> GapFinding:
     return GapFinding(begin, end, None, f"window not usable: {reason}", (), {})
 
 
-def _sentence(found: Discrepancy, effects: Sequence[str]) -> str:
-    if found.verdict is GapVerdict.NONE:
+def _sentence(found: discrepancy.Discrepancy, effects: Sequence[str]) -> str:
+    if found.verdict is discrepancy.GapVerdict.NONE:
         return "no effect of the catalogue is found"
-    if found.verdict is GapVerdict.UNTESTABLE:
+    if found.verdict is discrepancy.GapVerdict.UNTESTABLE:
         return "no effect is found, and the window could not show any of valve or process"
-    if found.verdict is GapVerdict.UNKNOWN:
+    if found.verdict is discrepancy.GapVerdict.UNKNOWN:
         rest = "the gap is there, but no effect of the catalogue explains it"
         return "; ".join((*effects, rest))
     if effects:
@@ -106,7 +85,7 @@ def _sentence(found: Discrepancy, effects: Sequence[str]) -> str:
     return "one of " + ", ".join(_named(place, effect) for place, effect in found.alternatives)
 
 
-def _effect(effect: FoundEffect, start: float) -> str:
+def _effect(effect: discrepancy.FoundEffect, start: float) -> str:
     """Return an effect such as ``V1: stiction f_s 4.9 (4.6 to 5.2) %, f_d 2 (1.8 to 2.2) %``."""
     units = _units(effect)
     parts = []
@@ -129,7 +108,7 @@ def _named(place: str, effect: str) -> str:
     return f"{tag}: {kind} {effect}" if tag else f"{kind} {effect}"
 
 
-def _units(effect: FoundEffect) -> dict[str, str]:
+def _units(effect: discrepancy.FoundEffect) -> dict[str, str]:
     """Return the units of the parameters; a signal's own unit is not known here."""
     found: dict[str, str] = {}
     for kind in behaviours():

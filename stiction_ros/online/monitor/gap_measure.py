@@ -49,26 +49,15 @@ class OutputBaseline:
 
 @dataclasses.dataclass(frozen=True)
 class OutputLook:
-    """One output in one window, units of the output.
+    """One output in one window, units of the output."""
 
-    Attributes:
-        name: tag.
-        gap: standard deviation s₁ of the innovations of the model's free run, under the noise
-            of the baseline.
-        baseline: the same in the baseline, s₀.
-        limit: of s₁/s₀, for a healthy loop to exceed as seldom as asked.
-        back: of s₁/s₀, below which a gap that had grown counts as gone.
-        free_run_rmse: of PV less the free run, on rows that nothing was fitted to.
-        noise_floor: standard deviation of the noise of the baseline in a free run.
-    """
-
-    name: str
-    gap: float
-    baseline: float
-    limit: float
-    back: float
-    free_run_rmse: float
-    noise_floor: float
+    name: str  # tag
+    gap: float  # standard deviation s₁ of the free run's innovations under that noise
+    baseline: float  # the same in the baseline, s₀
+    limit: float  # of s₁/s₀, for a healthy loop to exceed as seldom as asked
+    back: float  # of s₁/s₀, below which a gap that had grown counts as gone
+    free_run_rmse: float  # of PV less the free run, on rows that nothing was fitted to
+    noise_floor: float  # standard deviation of the noise of the baseline in a free run
 
     @property
     def growth(self) -> float:
@@ -85,11 +74,6 @@ def begun_at_stems(model: LoopModel, record: Record, count: int) -> Record:
 
     A free run takes a stem to be where OP is at its first sample. A sticky valve seldom is, so
     the valves' effects are run over all samples before. With ideal valves nothing is replaced.
-
-    Args:
-        model: whose valves are run.
-        record: the window and what came before it.
-        count: samples of the window.
     """
     first = max(len(record) - count, 0)
     part = record.part(first, len(record))
@@ -109,8 +93,7 @@ def baseline_of(model: LoopModel, record: Record) -> tuple[OutputBaseline, ...]:
     """Return the noise of every output in the baseline.
 
     Raises:
-        InputError: a record that does not fit the model, or a model whose free run grows
-            without bound.
+        InputError: another loop's record, or a model whose free run grows without bound.
     """
     run = FreeRun(model, join_records(model, [record]))
     return tuple(_output_baseline(run, i) for i in range(len(model.outputs)))
@@ -126,14 +109,8 @@ def look_at(
 
     .. math:: s_1^2 / s_0^2 \sim F(\nu_1, \nu_0), \quad \nu_1 = \nu_0 n_1 / n_0
 
-    Args:
-        model: the loop as it is known.
-        record: the window.
-        known: what :func:`baseline_of` gives for the same model.
-        chance: that the limit of any output is exceeded in a window of a healthy loop.
-
-    Raises:
-        InputError: as :func:`baseline_of`.
+    The ``chance`` is that a window of a healthy loop exceeds the limit of any output; ``known``
+    is what :func:`baseline_of` gives for the same model, and so are its errors.
     """
     from scipy.stats import f as fisher
 

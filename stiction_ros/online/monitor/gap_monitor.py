@@ -12,13 +12,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.monitor.gap_measure import (
-    OutputBaseline,
-    OutputLook,
-    baseline_of,
-    begun_at_stems,
-    look_at,
-)
+from stiction_ros.online.monitor import gap_measure
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
 
@@ -57,27 +51,18 @@ class MonitorRule:
 
 @dataclasses.dataclass(frozen=True)
 class GapLook:
-    """One measurement of the gap.
+    """One measurement of the gap."""
 
-    Attributes:
-        begin, end: first and last sample of the window.
-        outputs: empty when the window could not be used.
-        grown: whether the gap counts as grown now.
-        alarm: whether it has grown with this window.
-        failure: why the window could not be used, or empty.
-        job: model and window that the workflow is to look into, or None.
-    """
-
-    begin: int
+    begin: int  # begin, end: first and last sample of the window
     end: int
-    outputs: tuple[OutputLook, ...]
-    grown: bool
-    alarm: bool = False
-    failure: str = ""
-    job: tuple[LoopModel, Record] | None = None
+    outputs: tuple[gap_measure.OutputLook, ...]  # empty when the window could not be used
+    grown: bool  # whether the gap counts as grown now
+    alarm: bool = False  # whether it has grown with this window
+    failure: str = ""  # why the window could not be used, or empty
+    job: tuple[LoopModel, Record] | None = None  # model and window for the workflow, or None
 
     @property
-    def worst(self) -> OutputLook | None:
+    def worst(self) -> gap_measure.OutputLook | None:
         """The output whose gap has grown most against its limit."""
         return max(self.outputs, key=lambda look: look.growth / look.limit, default=None)
 
@@ -106,9 +91,8 @@ class GapLook:
 class GapMonitor:
     """Keeps the window, the baseline and whether the gap has grown.
 
-    The baseline is a stretch of signals, not a figure: another model is measured on the same
-    stretch. When as many samples have passed under another model, they become the baseline if
-    their gap is smaller: a limit cycle, say, is no good yardstick.
+    The baseline is a stretch of signals: another model is measured on the same one. When as many
+    samples have passed under another model, they become the baseline if their gap is smaller.
 
     The workflow looks into the window with which the gap has grown, and into one more every
     half window while it stays so, up to the first that lies wholly behind the alarm.
@@ -141,7 +125,7 @@ class GapMonitor:
 
     def _forget(self) -> None:
         """Drop what was measured by another model."""
-        self._known: tuple[OutputBaseline, ...] = ()
+        self._known: tuple[gap_measure.OutputBaseline, ...] = ()
         self._grown_since: int | None = None
         self._looked_into: int | None = None
 
@@ -216,10 +200,12 @@ class GapMonitor:
     def _look(self, model: LoopModel, reference: Record, window: Record, sample: int) -> GapLook:
         count = self.rule.monitor_baseline
         if not self._known:
-            self._known = baseline_of(model, begun_at_stems(model, reference, count))
+            self._known = gap_measure.baseline_of(
+                model, gap_measure.begun_at_stems(model, reference, count)
+            )
         self._replace_baseline(model, sample)
-        record = begun_at_stems(model, window, self.rule.monitor_window)
-        outputs = look_at(model, record, self._known, self.rule.monitor_false_alarm)
+        record = gap_measure.begun_at_stems(model, window, self.rule.monitor_window)
+        outputs = gap_measure.look_at(model, record, self._known, self.rule.monitor_false_alarm)
         least = 1.0 + self.rule.monitor_growth
         if self._grown_since is None:
             if any(look.growth > max(look.limit, least) for look in outputs):
@@ -240,7 +226,7 @@ class GapMonitor:
         if stretch is None:
             return
         self._changed = None
-        known = baseline_of(model, begun_at_stems(model, stretch, count))
+        known = gap_measure.baseline_of(model, gap_measure.begun_at_stems(model, stretch, count))
         if _size(known) < _size(self._known):
             self._reference, self._known = stretch, known
 
@@ -256,6 +242,6 @@ class GapMonitor:
         return True
 
 
-def _size(known: Sequence[OutputBaseline]) -> float:
+def _size(known: Sequence[gap_measure.OutputBaseline]) -> float:
     """Return the gap of all outputs as one figure, the mean logarithm."""
     return float(np.mean([np.log(max(base.std, 1e-300)) for base in known]))

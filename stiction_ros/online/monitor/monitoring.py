@@ -30,11 +30,7 @@ def run_here(work: Callable[..., Any], *arguments: Any) -> Future[Any]:
 def check_model(
     model: LoopModel, valves: Sequence[str], outputs: Sequence[str], sample_time: float
 ) -> None:
-    """Refuse a model of another loop.
-
-    Raises:
-        InputError: other tags or another sample time than the loop's.
-    """
+    """Refuse a model of another loop, by its tags and its sample time."""
     for what, wanted, found in (
         ("valves", valves, model.valve_names),
         ("outputs", outputs, model.outputs),
@@ -86,15 +82,10 @@ class Monitoring:
         given: LoopModel | None = None,
         submit: Submit = run_here,
     ) -> None:
-        """Start with the given model, or with none.
+        """Start with the given model, or with none; that of another loop fails each measurement.
 
-        Args:
-            rule: when the gap has grown.
-            live: the estimator whose samples and fits it shares.
-            given: the model to compare with.
-            submit: runs a function with its arguments, here or in another process, in order.
-
-        A model of another loop shows as the failure of every measurement.
+        The estimator ``live`` shares samples and fits; ``submit`` runs a function with arguments,
+        here or in another process, in order.
         """
         self._live, self._given, self._submit = live, given, submit
         self.monitor = GapMonitor(rule, live.loop, live.valves, live.outputs, live.sample_time)

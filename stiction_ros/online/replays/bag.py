@@ -16,7 +16,7 @@ from stiction_ros.records.bag.messages import BagMessage, last_part, read_messag
 from stiction_ros.records.bag.run_metadata import mapping_of
 from stiction_ros.records.run.bag_runs import tell_runs
 from stiction_ros.records.run.events import Fit, GapLog, ModeChange, fits, gap_log, mode_changes
-from stiction_ros.records.run.loop_signals import JOINT_STATE
+from stiction_ros.records.run.loop_signals import JOINT_STATE, LoopSignals
 from stiction_ros.records.storage.bag_metadata import BagTopic
 
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
@@ -52,15 +52,11 @@ class Signal:
 
 @dataclasses.dataclass(frozen=True)
 class PublishedFit:
-    """One message of ``stiction``.
+    """One message of ``stiction``."""
 
-    Attributes:
-        rows: value, lower and upper end by ``V1.f_s``, %; empty for an unusable window.
-        token: ``valid_from`` of the loop model in force, as text.
-    """
-
+    # value, lower and upper end by ``V1.f_s``, %; empty for an unusable window
     rows: Mapping[str, tuple[float, float, float]]
-    token: str
+    token: str  # ``valid_from`` of the loop model in force, as text
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,35 +80,22 @@ class NodeConfig:
 
 @dataclasses.dataclass(frozen=True)
 class ReplayBag:
-    """A bag, ready to be replayed.
+    """A bag, ready to be replayed."""
 
-    Attributes:
-        name: of the bag.
-        namespace: of the loop's topics.
-        signals: in the order of the bag.
-        estimator, controller: configurations, None when the bag has none.
-        published_fits: messages of ``stiction`` by the end of their window, ns.
-        told_fits: the fits in ``/diagnostics`` by the end of their window, ns.
-        told_gaps: what the monitor told in ``/diagnostics``.
-        models: messages of ``loop_model`` in their order.
-        modes: changes of mode in ``/diagnostics``, the first mode included.
-        counted: a stamp in ns and how many samples the estimator had taken in up to it; None
-            when the bag does not tell.
-        notes: what was left out or stands in the way, one sentence each.
-    """
-
-    name: str
-    namespace: str
-    signals: tuple[Signal, ...]
-    estimator: NodeConfig | None
+    name: str  # of the bag
+    namespace: str  # of the loop's topics
+    signals: tuple[Signal, ...]  # in the order of the bag
+    estimator: NodeConfig | None  # estimator, controller: configurations, None when there is none
     controller: NodeConfig | None
-    published_fits: Mapping[int, PublishedFit]
-    told_fits: Mapping[int, Fit]
-    told_gaps: GapLog
-    models: tuple[PublishedModel, ...]
-    modes: tuple[ModeChange, ...]
+    published_fits: Mapping[int, PublishedFit]  # on ``stiction``, by the end of their window, ns
+    told_fits: Mapping[int, Fit]  # the fits in ``/diagnostics`` by the end of their window, ns
+    told_gaps: GapLog  # what the monitor told in ``/diagnostics``
+    models: tuple[PublishedModel, ...]  # messages of ``loop_model`` in their order
+    modes: tuple[ModeChange, ...]  # changes of mode in ``/diagnostics``, the first mode included
+    # a stamp in ns and how many samples the estimator had taken in up to it; None when the bag does
+    # not tell
     counted: tuple[int, int] | None
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what was left out or stands in the way, one sentence each
 
     def stamps(self, kind: str) -> list[int]:
         """Return the stamps of one signal in ascending order, each once, ns."""
@@ -122,23 +105,25 @@ class ReplayBag:
 def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> ReplayBag:
     """Read what a replay needs from a bag, in one pass.
 
-    Args:
-        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
-        namespace: of the loop; needed when the bag holds several loops.
-
-    Raises:
-        InputError: no such bag, damaged, without ``pv`` and ``op``, or of several loops.
+    The ``namespace`` of the loop is needed when the bag holds several. A damaged bag, or one
+    without ``pv`` and ``op``, is refused.
     """
     notes: list[str] = []
     messages = list(read_messages(path, wanted=_wanted, notes=notes))
     space = _loop(messages, namespace, str(path))
     inside = [m for m in messages if _node_or_topic_space(m) in (space, None)]
     configs = _configs(inside, space, notes)
-    loops = {_hardware(config) for config in configs.values()}
+    # The diagnostics of a node name its loop as their hardware.
+    loops = {
+        str(config.parameters.get("loop") or (config.model or {}).get("loop", ""))
+        for config in configs.values()
+    }
+    known = {"", *loops}
     diagnostics = [
         m
         for m in inside
-        if m.type == DIAGNOSTICS and (not loops or any(_is_of(s, loops) for s in m.message.status))
+        if m.type == DIAGNOSTICS
+        and (not loops or any(str(s.hardware_id) in known for s in m.message.status))
     ]
     notes += _changed_parameters(inside, configs.values())
     signals = tuple(_signals(inside))
@@ -173,43 +158,18 @@ def _wanted(topic: BagTopic) -> bool:
 
 def _loop(messages: Iterable[BagMessage], namespace: str | None, where: str) -> str:
     """Return the namespace of the loop to replay."""
-    found: dict[str, set[str]] = {}
-    for message in messages:
-        space, name = last_part(message.topic)
-        if message.type == JOINT_STATE:
-            found.setdefault(space, set()).add(name)
-    loops = sorted(space for space, names in found.items() if {"pv", "op"} <= names)
-    if namespace is not None:
-        wanted = "/" + namespace.strip("/") if namespace.strip("/") else ""
-        if wanted not in loops:
-            _refuse_listened({wanted: found.get(wanted, set())}, where)
-            known = ", ".join(space or "/" for space in loops) or "none"
-            raise InputError(
-                f"holds no loop in the namespace {namespace}",
-                where=where,
-                fix=f"its loops are {known}",
-            )
-        return wanted
-    if not loops:
-        _refuse_listened(found, where)
-        raise InputError("holds no topics pv and op", where=where, fix="record both")
-    if len(loops) > 1:
-        raise InputError(
-            f"holds {len(loops)} loops ({', '.join(space or '/' for space in loops)})",
-            where=where,
-            fix="choose one by --namespace",
-        )
-    return loops[0]
-
-
-def _refuse_listened(found: Mapping[str, set[str]], where: str) -> None:
-    """Raise InputError when a loop has ``pv`` and ``op_applied`` but nobody gave an ``op``."""
-    if any({"pv", "op_applied"} <= names for names in found.values()):
+    signals = LoopSignals(where)
+    for number, message in enumerate(messages):
+        if message.type == JOINT_STATE and last_part(message.topic)[1] in _INPUTS:
+            signals.add(message, number)
+    space = signals.loop(namespace)
+    if signals.op(space) != "op":
         raise InputError(
             "was recorded while only listening (op_applied, no op): no controller's OP to replay",
             where=where,
             fix="identify, report, convert and gap take it",
         )
+    return space
 
 
 def _node_or_topic_space(message: BagMessage) -> str | None:
@@ -282,16 +242,6 @@ def _configs(messages: Iterable[BagMessage], space: str, notes: list[str]) -> di
             continue
         found.setdefault(kind, config)
     return found
-
-
-def _hardware(config: NodeConfig) -> str:
-    """Return the loop that the diagnostics of a node name as their hardware."""
-    named = config.parameters.get("loop") or (config.model or {}).get("loop", "")
-    return str(named)
-
-
-def _is_of(status: Any, loops: set[str]) -> bool:
-    return not status.hardware_id or str(status.hardware_id) in loops
 
 
 def _changed_parameters(messages: Iterable[BagMessage], configs: Iterable[NodeConfig]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from stiction_ros.online.input.samples import Sample
 from stiction_ros.online.input.signal_check import SignalCheck
 from stiction_ros.online.node_settings import ControllerNodeSettings
 from stiction_ros.online.replays.bag import ReplayBag
-from stiction_ros.records.run.events import ModeChange
+from stiction_ros.records.run.events import ModeChange, without_repeats
 
 SECOND = 10**9
 
@@ -33,13 +33,7 @@ class Offer:
 
 @dataclasses.dataclass(frozen=True)
 class OpMatch:
-    """How the recorded ``op`` and the replayed ones compare.
-
-    Attributes:
-        compared: samples at which both are there.
-        equal: how many of them agree in every bit.
-        first_difference: which sample differs first and how; empty when none does.
-    """
+    """How many recorded and replayed ``op`` are there, how many equal, and the first others."""
 
     compared: int = 0
     equal: int = 0
@@ -48,17 +42,11 @@ class OpMatch:
 
 @dataclasses.dataclass(frozen=True)
 class ReplayedControl:
-    """What the controller did in the replay.
+    """What the controller did in the replay."""
 
-    Attributes:
-        changes: modes in their order, the one at the start first.
-        op: comparison with the recorded ``op``.
-        notes: why it stopped or left something out.
-    """
-
-    changes: tuple[ModeChange, ...]
-    op: OpMatch
-    notes: tuple[str, ...]
+    changes: tuple[ModeChange, ...]  # modes in their order, the one at the start first
+    op: OpMatch  # comparison with the recorded ``op``
+    notes: tuple[str, ...]  # why it stopped or left something out
 
 
 def replay_controller(
@@ -70,17 +58,11 @@ def replay_controller(
 ) -> ReplayedControl:
     """Step the controller over the recorded ``pv``, ``op_applied``, ``sp`` and ``dv``.
 
-    Args:
-        bag: the recorded run.
-        settings, model: as the node had them.
-        offers: loop models of the estimator in their order.
-        origin: stamp of sample 0 of the run, ns.
-
-    Raises:
-        InputError: settings that do not fit the model.
+    Settings and model are those of the node, ``offers`` loop models in order; ``origin`` is the
+    stamp of sample 0 of the run, ns.
     """
     live = ValveTestingController(settings, model)
-    recorded = _recorded_op(bag, model)
+    recorded = _by_stamp(bag, "op", model.valve_names)
     step = round(model.sample_time * SECOND)
     notes: list[str] = []
     changes: list[ModeChange] = []
@@ -109,7 +91,7 @@ def replay_controller(
             changes.append(
                 ModeChange(stamp, change.mode.value, change.model, change.reason, frictions)
             )
-    return ReplayedControl(_without_repeats(changes), match, tuple(notes))
+    return ReplayedControl(without_repeats(changes), match, tuple(notes))
 
 
 def _offer(live: LiveController, offer: Offer, first: int, notes: list[str]) -> None:
@@ -122,14 +104,11 @@ def _offer(live: LiveController, offer: Offer, first: int, notes: list[str]) -> 
 def _samples(
     bag: ReplayBag, settings: ControllerNodeSettings, model: LoopModel, notes: list[str]
 ) -> Iterator[Sample]:
-    """Yield every sample that has all the controller waits for, oldest first.
-
-    In realtime a sample without a recorded ``op`` was passed over, and one without ``pv`` was
-    stepped without; in lockstep every one was answered.
-    """
+    """Yield every sample that has all the controller waits for, oldest first."""
     lockstep = settings.pace == "lockstep"
-    pv, dv = _by_stamp(bag, "pv", model.outputs), _disturbances(bag, model)
-    op, given = _recorded_op(bag, model), _given(bag, model)
+    pv = _by_stamp(bag, "pv", model.outputs)
+    dv = _by_stamp(bag, "dv", model.process.measured_disturbances)
+    op, given = _by_stamp(bag, "op", model.valve_names), _given(bag, model)
     if lockstep and settings.sp_source == "schedule":
         sp = _by_stamp(bag, "sp", model.outputs)
     else:
@@ -149,7 +128,9 @@ def _samples(
                 f"{lacking or 'dv'} is missing at {stamp / SECOND:.9g} s, the replay ends there"
             )
             return
-        held_sp, held_dv = _good(check, sp.get(stamp), held_sp), dv.get(stamp, held_dv)
+        if stamp in sp and check.within(sp[stamp]):
+            held_sp = sp[stamp]
+        held_dv = dv.get(stamp, held_dv)
         if held_sp is None:
             continue  # no set-point that can be used has come yet
         begins = number < 0
@@ -165,10 +146,6 @@ def _samples(
         before = stamp
 
 
-def _good(check: SignalCheck, sp: FloatArray | None, held: FloatArray | None) -> FloatArray | None:
-    return sp if sp is not None and check.within(sp) else held
-
-
 def _by_stamp(bag: ReplayBag, kind: str, names: tuple[str, ...]) -> dict[int, FloatArray]:
     """Return the values of one signal by stamp; of several at one stamp the first."""
     found: dict[int, FloatArray] = {}
@@ -178,10 +155,6 @@ def _by_stamp(bag: ReplayBag, kind: str, names: tuple[str, ...]) -> dict[int, Fl
             if values is not None:
                 found[signal.stamp] = values
     return found
-
-
-def _disturbances(bag: ReplayBag, model: LoopModel) -> Mapping[int, FloatArray]:
-    return _by_stamp(bag, "dv", model.process.measured_disturbances)
 
 
 def _held_set_points(bag: ReplayBag, names: tuple[str, ...]) -> dict[int, FloatArray]:
@@ -209,10 +182,6 @@ def _given(bag: ReplayBag, model: LoopModel) -> dict[int, Given]:
     return found
 
 
-def _recorded_op(bag: ReplayBag, model: LoopModel) -> dict[int, FloatArray]:
-    return _by_stamp(bag, "op", model.valve_names)
-
-
 def _compared(match: OpMatch, op: FloatArray, recorded: FloatArray | None, time: float) -> OpMatch:
     if recorded is None:
         return match
@@ -221,13 +190,3 @@ def _compared(match: OpMatch, op: FloatArray, recorded: FloatArray | None, time:
     if not same and not difference:
         difference = f"op at {time:.9g} s: recorded {recorded.tolist()}, replayed {op.tolist()}"
     return OpMatch(match.compared + 1, match.equal + same, difference)
-
-
-def _without_repeats(changes: list[ModeChange]) -> tuple[ModeChange, ...]:
-    """Drop changes that change neither mode nor model nor friction, as their readers do."""
-    kept: list[ModeChange] = []
-    for change in changes:
-        force = (change.mode, change.model, change.frictions)
-        if not kept or force != (kept[-1].mode, kept[-1].model, kept[-1].frictions):
-            kept.append(change)
-    return tuple(kept)

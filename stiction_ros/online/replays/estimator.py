@@ -9,14 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from stiction_ros import identification
 from stiction_ros.errors import InputError
-from stiction_ros.identification import (
-    FitStatus,
-    Identification,
-    OutputModel,
-    ValveEstimate,
-    VerdictKind,
-)
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
@@ -33,25 +27,15 @@ SECOND = 10**9
 
 @dataclasses.dataclass(frozen=True)
 class ReplayedFit:
-    """One fit of the replay.
+    """One fit of the replay."""
 
-    Attributes:
-        end: last sample of the window, counted from the first sample of the run.
-        stamp: its time, ns.
-        whole: whether the bag holds the whole window; otherwise the recorded fit stands in.
-        update: what the fit says; None when the window was not usable.
-        failure: why it was not usable, or empty.
-        token: ``valid_from`` of the loop model in force after it, as text.
-        model_text: YAML of the loop model that it publishes, or empty.
-    """
-
-    end: int
-    stamp: int
-    whole: bool
-    update: FitUpdate | None
-    failure: str
-    token: str
-    model_text: str
+    end: int  # last sample of the window, counted from the first sample of the run
+    stamp: int  # its time, ns
+    whole: bool  # whether the bag holds the whole window; otherwise the recorded fit stands in
+    update: FitUpdate | None  # what the fit says; None when the window was not usable
+    failure: str  # why it was not usable, or empty
+    token: str  # ``valid_from`` of the loop model in force after it, as text
+    model_text: str  # YAML of the loop model that it publishes, or empty
 
     @property
     def rows(self) -> dict[str, tuple[float, float, float]]:
@@ -67,7 +51,7 @@ class ReplayedEstimator:
         origin: stamp of sample 0 of the run, ns; None for the first ``pv`` in the bag.
         told: recorded identifications by the end of their window in ns; they stand in for
             windows that reach back before the bag, so that trust is built on all of them.
-        fitter: runs one fit; the default runs it here and now.
+        fitter: runs one fit.
         watched: what the monitor compares with; None for the loop as it is identified.
     """
 
@@ -76,7 +60,7 @@ class ReplayedEstimator:
         settings: EstimatorNodeSettings,
         origin: int | None = None,
         told: Mapping[int, Mapping[str, Any]] | None = None,
-        fitter: Callable[..., Identification] = fit,
+        fitter: Callable[..., identification.Identification] = fit,
         *,
         watched: LoopModel | None = None,
     ) -> None:
@@ -151,7 +135,7 @@ class ReplayedEstimator:
                 self._unusable(sample, "samples are missing")
 
     def _fit(self, live: LiveEstimator, end: int, record: Record) -> None:
-        whole = self._begins(end) >= (self.first or 0)
+        whole = max(end + 1 - self.settings.window, 0) >= (self.first or 0)
         if not whole:
             mapping = self._told.get(self._pairs.stamp_of(end))
             if mapping is None:
@@ -167,12 +151,8 @@ class ReplayedEstimator:
             return
         self._conclude(live, end, found, whole=True)
 
-    def _begins(self, end: int) -> int:
-        """Return the first sample of the window that ends at ``end``."""
-        return max(end + 1 - self.settings.window, 0)
-
     def _conclude(
-        self, live: LiveEstimator, end: int, found: Identification, *, whole: bool
+        self, live: LiveEstimator, end: int, found: identification.Identification, *, whole: bool
     ) -> None:
         stamp = self._pairs.stamp_of(end)
         update = live.conclude(end, found)
@@ -191,15 +171,11 @@ class ReplayedEstimator:
         self.fits.append(ReplayedFit(end, stamp, whole, None, why, self._token, ""))
 
 
-def identification_of(mapping: Mapping[str, Any]) -> Identification:
-    """Return the identification that a mapping of ``identify --json`` tells, without stems.
-
-    Raises:
-        InputError: the mapping does not hold what an identification needs.
-    """
+def identification_of(mapping: Mapping[str, Any]) -> identification.Identification:
+    """Return the identification that a mapping of ``identify --json`` tells, without stems."""
     try:
-        return Identification(
-            status=FitStatus(mapping["model"]["status"]),
+        return identification.Identification(
+            status=identification.FitStatus(mapping["model"]["status"]),
             reason=str(mapping["model"]["reason"]),
             method=str(mapping["model"]["method"]),
             samples=int(mapping["samples"]),
@@ -215,10 +191,10 @@ def identification_of(mapping: Mapping[str, Any]) -> Identification:
         ) from None
 
 
-def _valve(valve: Mapping[str, Any]) -> ValveEstimate:
-    return ValveEstimate(
+def _valve(valve: Mapping[str, Any]) -> identification.ValveEstimate:
+    return identification.ValveEstimate(
         name=str(valve["name"]),
-        verdict=VerdictKind(valve["verdict"]),
+        verdict=identification.VerdictKind(valve["verdict"]),
         law=str(valve["law"]),
         static_friction=float(valve["f_s"]),
         static_interval=_interval(valve["f_s_interval"]),
@@ -236,8 +212,8 @@ def _valve(valve: Mapping[str, Any]) -> ValveEstimate:
     )
 
 
-def _output(output: Mapping[str, Any]) -> OutputModel:
-    return OutputModel(
+def _output(output: Mapping[str, Any]) -> identification.OutputModel:
+    return identification.OutputModel(
         name=str(output["name"]),
         a=tuple(float(value) for value in output["a"]),
         b={str(key): tuple(float(v) for v in row) for key, row in output["b"].items()},

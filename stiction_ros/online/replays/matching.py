@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from stiction_ros.online.replays.bag import PublishedFit, ReplayBag
-from stiction_ros.online.replays.estimator import ReplayedFit
-from stiction_ros.online.replays.result import FitMatch, Match, ModeMatch
+from stiction_ros.online.replays.estimator import ReplayedEstimator, ReplayedFit
+from stiction_ros.online.replays.result import FitMatch, Match, ModeMatch, MonitorMatch
 from stiction_ros.records.run.events import ModeChange
 from stiction_ros.texts import json_text
 
@@ -19,10 +19,7 @@ _TIMES = ("seconds",)  # wall time of a fit is another each time
 def match_fit(bag: ReplayBag, fit: ReplayedFit, trust_known: bool = True) -> FitMatch:
     """Compare one fit with ``stiction``, ``loop_model`` and the fit told in ``/diagnostics``.
 
-    Args:
-        bag, fit: what was recorded and what the replay gives.
-        trust_known: whether trust was built on all fits of the run; otherwise only the fit
-            itself is compared, not what is trusted after it.
+    Where trust was not built on all fits of the run, what is trusted after it is not compared.
     """
     if not fit.whole:
         taken = "" if fit.update is None else ", the recorded fit is taken"
@@ -38,14 +35,10 @@ def match_fit(bag: ReplayBag, fit: ReplayedFit, trust_known: bool = True) -> Fit
 
 def trust_is_known(bag: ReplayBag, fits: Sequence[ReplayedFit], first: int) -> bool:
     """Return whether trust was built on every fit of the run, the one at sample ``first`` on."""
+    unusable = {stamp for stamp, published in bag.published_fits.items() if not published.rows}
     return bool(fits and fits[0].end == first) and all(
-        fit.whole or fit.update is not None or _told_unusable(bag, fit) for fit in fits
+        fit.whole or fit.update is not None or fit.stamp in unusable for fit in fits
     )
-
-
-def _told_unusable(bag: ReplayBag, fit: ReplayedFit) -> bool:
-    published = bag.published_fits.get(fit.stamp)
-    return published is not None and not published.rows
 
 
 def match_modes(recorded: Sequence[ModeChange], replayed: Sequence[ModeChange]) -> ModeMatch:
@@ -140,3 +133,48 @@ def first_difference(recorded: Any, found: Any, place: str = "") -> str:
         if difference:
             return difference
     return ""
+
+
+def match_monitor(bag: ReplayBag, estimator: ReplayedEstimator) -> MonitorMatch | None:
+    """Compare measurements and findings by the end of their window; None without a monitor.
+
+    Of the bag everything must come again; what the node was still looking into is not in it.
+    """
+    if not estimator.settings.monitor:
+        return None
+    if estimator.first != 0:
+        why = "the bag begins after the baseline"
+        return MonitorMatch(0, 0, 0, 0, Match.NOT_COMPARED, why)
+    origin, step = estimator.origin, estimator.step
+    looks = {origin + look.end * step: look.to_dict() for look in estimator.looks}
+    found = {origin + one.end * step: one.to_dict() for one in estimator.findings}
+    gaps = _differences("gap", bag.told_gaps.looks, looks, origin)
+    named = _differences("finding", bag.told_gaps.findings, found, origin)
+    told, shown = len(bag.told_gaps.looks), len(bag.told_gaps.findings)
+    match, difference = Match.EQUAL, ""
+    if gaps or named:
+        match, difference = Match.DIFFERENT, [*gaps, *named][0]
+    elif not told:
+        match, difference = Match.NOT_COMPARED, "the bag holds no measurement"
+    return MonitorMatch(told, told - len(gaps), shown, shown - len(named), match, difference)
+
+
+def _differences(
+    kind: str,
+    told: Mapping[int, Mapping[str, Any]],
+    replayed: Mapping[int, Mapping[str, Any]],
+    origin: int,
+) -> list[str]:
+    """Return a sentence for each recorded document that did not come again as it was."""
+    found = []
+    for stamp, document in told.items():
+        where = f"{kind} of the window that ends at {(stamp - origin) / 1e9:.9g} s"
+        if stamp not in replayed:
+            found.append(f"{where}: recorded, not replayed")
+            continue
+        # Through text and back, as the recorded one went.
+        again = json.loads(json_text(replayed[stamp], indent=None))
+        difference = first_difference(document, again)
+        if difference:
+            found.append(f"{where}: {difference}")
+    return found

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from collections.abc import Sequence
 from typing import Any
 
 from stiction_ros.online.replays.bag import ReplayBag
 from stiction_ros.online.replays.controller import SECOND, OpMatch
 from stiction_ros.online.replays.estimator import ReplayedFit
-from stiction_ros.records.run.events import ModeChange
+from stiction_ros.records.run.events import ModeChange, swap_of
 from stiction_ros.texts import finite
 
 
@@ -24,35 +23,22 @@ class Match(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class FitMatch:
-    """One fit, replayed and recorded.
+    """One fit, replayed and recorded."""
 
-    Attributes:
-        fit: of the replay.
-        match: equal in every bit, different, or not compared.
-        difference: the first difference, or why it is not compared; empty when equal.
-    """
-
-    fit: ReplayedFit
-    match: Match
-    difference: str
+    fit: ReplayedFit  # of the replay
+    match: Match  # equal in every bit, different, or not compared
+    difference: str  # the first difference, or why it is not compared; empty when equal
 
 
 @dataclasses.dataclass(frozen=True)
 class ModeMatch:
-    """The changes of mode, recorded and replayed.
+    """The changes of mode, recorded and replayed."""
 
-    Attributes:
-        recorded, replayed: in their order.
-        match: equal when stamps, modes, models, reasons and frictions are.
-        difference: the first difference, or why nothing is compared; empty when equal.
-        before: mode in force when a bag that begins late begins; empty otherwise.
-    """
-
-    recorded: tuple[ModeChange, ...]
+    recorded: tuple[ModeChange, ...]  # recorded, replayed: in their order
     replayed: tuple[ModeChange, ...]
-    match: Match
-    difference: str
-    before: str = ""
+    match: Match  # equal when stamps, modes, models, reasons and frictions are
+    difference: str  # the first difference, or why nothing is compared; empty when equal
+    before: str = ""  # mode in force when a bag that begins late begins; empty otherwise
 
     @property
     def swaps(self) -> tuple[ModeChange | None, ModeChange | None]:
@@ -62,48 +48,29 @@ class ModeMatch:
 
 @dataclasses.dataclass(frozen=True)
 class MonitorMatch:
-    """What the monitor told, replayed and recorded.
+    """What the monitor told, replayed and recorded."""
 
-    Attributes:
-        looks, equal_looks: measurements of the gap in the bag, and how many came again.
-        findings, equal_findings: windows looked into, likewise.
-        match: equal in every bit, different, or not compared.
-        difference: the first difference, or why nothing is compared; empty when equal.
-    """
-
-    looks: int
+    looks: int  # looks, equal_looks: measurements of the gap in the bag, and how many came again
     equal_looks: int
-    findings: int
+    findings: int  # findings, equal_findings: windows looked into, likewise
     equal_findings: int
-    match: Match
-    difference: str
+    match: Match  # equal in every bit, different, or not compared
+    difference: str  # the first difference, or why nothing is compared; empty when equal
 
 
 @dataclasses.dataclass(frozen=True)
 class Replay:
-    """A replay and its comparison with what was recorded.
+    """A replay and its comparison with what was recorded."""
 
-    Attributes:
-        bag: the recorded run.
-        origin: stamp of sample 0 of the run, ns.
-        from_first_sample: whether the bag holds the run from its first sample.
-        samples: of the run up to the end of the bag.
-        fits: every fit that was due within the bag.
-        modes: None when the bag has no configuration of a controller.
-        op: None likewise, and for a bag that begins later than the run.
-        notes: what stands in the way of equality, one sentence each.
-        monitor: None when the estimator ran without monitor.
-    """
-
-    bag: ReplayBag
-    origin: int
-    from_first_sample: bool
-    samples: int
-    fits: tuple[FitMatch, ...]
-    modes: ModeMatch | None
-    op: OpMatch | None
-    notes: tuple[str, ...]
-    monitor: MonitorMatch | None = None
+    bag: ReplayBag  # the recorded run
+    origin: int  # stamp of sample 0 of the run, ns
+    from_first_sample: bool  # whether the bag holds the run from its first sample
+    samples: int  # of the run up to the end of the bag
+    fits: tuple[FitMatch, ...]  # every fit that was due within the bag
+    modes: ModeMatch | None  # None when the bag has no configuration of a controller
+    op: OpMatch | None  # None likewise, and for a bag that begins later than the run
+    notes: tuple[str, ...]  # what stands in the way of equality, one sentence each
+    monitor: MonitorMatch | None = None  # None when the estimator ran without monitor
 
     @property
     def match(self) -> Match:
@@ -192,12 +159,3 @@ class Replay:
             "reason": change.reason,
             "friction": dict(change.frictions),
         }
-
-
-def swap_of(changes: Sequence[ModeChange], before: str = "") -> ModeChange | None:
-    """Return the first change from ``unaware`` to a mode that knows of the friction."""
-    for change in changes:
-        if before == "unaware" and change.mode in ("embedding", "inversion"):
-            return change
-        before = change.mode
-    return None

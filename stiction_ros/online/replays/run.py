@@ -11,16 +11,10 @@ from stiction_ros import __version__
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
+from stiction_ros.online.replays import matching
 from stiction_ros.online.replays.bag import NodeConfig, ReplayBag, read_replay_bag
-from stiction_ros.online.replays.controller import (
-    SECOND,
-    Offer,
-    ReplayedControl,
-    replay_controller,
-)
+from stiction_ros.online.replays.controller import SECOND, Offer, ReplayedControl, replay_controller
 from stiction_ros.online.replays.estimator import ReplayedEstimator
-from stiction_ros.online.replays.matching import match_fit, match_modes, trust_is_known
-from stiction_ros.online.replays.monitor import match_monitor
 from stiction_ros.online.replays.result import FitMatch, Match, ModeMatch, Replay
 from stiction_ros.settings import from_mapping
 
@@ -44,8 +38,7 @@ def replay(
         progress: told the share of the messages that the estimator has taken in.
 
     Raises:
-        InputError: no such bag, no configuration of an estimator in it, or settings that this
-            version cannot use.
+        InputError: no such bag, no configuration of an estimator in it, or unusable settings.
     """
     bag = read_replay_bag(path, namespace=namespace)
     if bag.estimator is None:
@@ -59,8 +52,8 @@ def replay(
     origin, notes = _origin(bag, settings, first)
     estimator = _estimate(bag, settings, origin, progress)
     whole = origin >= first
-    known = trust_is_known(bag, estimator.fits, settings.fit_first - 1)
-    fits = tuple(match_fit(bag, fit, known) for fit in estimator.fits)
+    known = matching.trust_is_known(bag, estimator.fits, settings.fit_first - 1)
+    fits = tuple(matching.match_fit(bag, fit, known) for fit in estimator.fits)
     notes += _remarks(bag)
     if estimator.missed:
         notes.append(f"{estimator.missed} samples are missing within the bag")
@@ -78,7 +71,7 @@ def replay(
         modes=modes,
         op=None if control is None or not whole else control.op,
         notes=tuple(notes),
-        monitor=match_monitor(bag, estimator),
+        monitor=matching.match_monitor(bag, estimator),
     )
 
 
@@ -127,10 +120,7 @@ def _control(
 def _offers(
     bag: ReplayBag, estimator: ReplayedEstimator, first: int, step: int
 ) -> tuple[Offer, ...]:
-    """Return the recorded loop models of fits before the bag, then the replayed ones.
-
-    A model takes effect at its ``valid_from``, or where it came in the bag if that is later.
-    """
+    """Return the recorded loop models of fits before the bag, then the replayed ones."""
     origin, latency = estimator.origin, estimator.settings.fit_latency * step
     begin = max((first - origin) // step, 0)
     came = {model.valid_from: model.ops_before + begin for model in bag.models}
@@ -149,14 +139,14 @@ def _modes(
 ) -> ModeMatch:
     """Compare the changes of mode; of a bag that begins late those after its first sample."""
     if whole:
-        return match_modes(bag.modes, control.changes)
+        return matching.match_modes(bag.modes, control.changes)
     recorded = tuple(change for change in bag.modes if change.stamp > first)
     replayed = tuple(change for change in control.changes if change.stamp > first)
     before = control.changes[0].mode if control.changes else ""
     if not known:
         why = "what was trusted before the bag is not known"
         return ModeMatch(recorded, replayed, Match.NOT_COMPARED, why, before)
-    return dataclasses.replace(match_modes(recorded, replayed), before=before)
+    return dataclasses.replace(matching.match_modes(recorded, replayed), before=before)
 
 
 def _remarks(bag: ReplayBag) -> list[str]:

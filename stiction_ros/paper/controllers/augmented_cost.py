@@ -18,20 +18,14 @@ from stiction_ros.processes import LinearModel
 
 @dataclasses.dataclass(frozen=True)
 class PlanProblem:
-    """What a plan starts from.
+    """What a plan starts from."""
 
-    Attributes:
-        state: ξ̂, shape (n,).
-        stem: χ_{−1}, shape (m,), %.
-        target: ξ_ss, χ_ss and the outputs there; u_s = χ_ss, the steady OP that leaves
-            the stem at rest in the middle of its band.
-        before: u_{−1}, shape (m,), %; None where OP was at the stem.
-    """
-
-    state: FloatArray
-    stem: FloatArray
+    state: FloatArray  # ξ̂, shape (n,)
+    stem: FloatArray  # χ_{−1}, shape (m,), %
+    # ξ_ss, χ_ss and the outputs there; u_s = χ_ss, the steady OP that leaves the stem at rest in
+    # the middle of its band
     target: Target
-    before: FloatArray | None = None
+    before: FloatArray | None = None  # u_{−1}, shape (m,), %; None where OP was at the stem
 
     @property
     def op_before(self) -> FloatArray:
@@ -61,14 +55,7 @@ class AugmentedCost:
         frictions: Sequence[PrintedFriction | None],
         bounds: FloatArray | None = None,
     ) -> None:
-        """Condense.
-
-        Args:
-            model: the process.
-            weights: of (22).
-            frictions: one entry per valve, None for a healthy one.
-            bounds: soft bounds of the outputs, shape (p, 2), infinite for none; None for none.
-        """
+        """Condense, for ``frictions`` with None for a healthy valve and ``bounds``, (p, 2)."""
         self.model, self.weights, self.frictions = model, weights, tuple(frictions)
         self.part = HorizonCost(model, weights.in_stems)
         self.horizon = weights.horizon

@@ -23,7 +23,6 @@ from stiction_ros.paper.controllers.smoothed_programme import (
     SmoothedProgramme,
     SoftOutputs,
 )
-from stiction_ros.paper.controllers.warm_start import compensation
 from stiction_ros.paper.controllers.weights import PaperTuning, WarmStart
 from stiction_ros.processes import LinearModel
 
@@ -37,19 +36,12 @@ class Choice(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class PrintedPlan(Plan):
-    """A plan, and what it was chosen from.
+    """A plan, and what it was chosen from."""
 
-    Attributes:
-        choice: the sequence with the lower cost (22) under the hard model (4).
-        programme: how IPOPT ended.
-        iterations: of IPOPT.
-        programme_cost, warm_start_cost: (22) under the hard model; inf where there is none.
-    """
-
-    choice: Choice
-    programme: ProgrammeStatus
-    iterations: int
-    programme_cost: float
+    choice: Choice  # the sequence with the lower cost (22) under the hard model (4)
+    programme: ProgrammeStatus  # how IPOPT ended
+    iterations: int  # of IPOPT
+    programme_cost: float  # programme_cost, warm_start_cost: (22), hard model; inf for none
     warm_start_cost: float
 
 
@@ -71,12 +63,7 @@ class PrintedEmbeddingMpc(Formulation):
         limits: HorizonLimits,
         frictions: Sequence[Behaviour | None],
     ) -> None:
-        """Build the programme once.
-
-        Raises:
-            InputError: no sticky valve, a law without a smoothed form, or bounds that this
-                formulation does not know.
-        """
+        """Build the programme once; InputError for valves or bounds that it does not know."""
         known = printed_frictions(frictions)
         _check(limits, known)
         self.tuning, self.frictions = tuning, known
@@ -172,3 +159,36 @@ def _check(limits: HorizonLimits, frictions: tuple[PrintedFriction | None, ...])
             where="op_rate_limits",
             fix="leave them out, or use formulation: exact",
         )
+
+
+def compensation(
+    friction: PrintedFriction,
+    before: float,
+    stems: tuple[float, float],
+    horizon: int,
+    first_move: float,
+) -> FloatArray:
+    r"""Return OP, shape (N,), %, of one valve by the three moves of (21).
+
+    .. math::
+        u_k &= u_{k-1} \pm a f_S & + \text{ if } u_{k-1} \ge \chi_{ss} \\
+        u_{k+1} &= \chi_k \pm f_D & + \text{ if } u_k \ge \chi_k \\
+        u_{k+2} &= \chi_{ss} \mp f_D & - \text{ if } u_{k+1} \ge \chi_{ss} \\
+        u_{k+j} &= u_{k+2} & j > 2
+
+    Args:
+        friction: of the valve.
+        before: u_{k−1}, %.
+        stems: χ_{k−1} and χ_ss, %.
+        horizon: N ≥ 1, samples.
+        first_move: a; for a > 2 the first move slips wherever the stem rests in its band.
+    """
+    stem, goal = stems
+    static, dynamic = friction.static_friction, friction.dynamic_friction
+    first = before + (first_move * static if before >= goal else -first_move * static)
+    moved = float(friction.simulate(np.array([first]), start=stem)[0])
+    second = moved + (dynamic if first >= moved else -dynamic)
+    third = goal - (dynamic if second >= goal else -dynamic)
+    op = np.full(horizon, third)
+    op[: min(2, horizon)] = (first, second)[:horizon]
+    return op

@@ -13,7 +13,9 @@ from stiction_ros.control.target import Target
 from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.paper.controllers.embedding import PrintedEmbeddingMpc
 from stiction_ros.paper.controllers.laws import printed_frictions
+from stiction_ros.paper.controllers.weights import PaperTuning
 
 
 class PrintedInversionMpc(Formulation):
@@ -30,11 +32,7 @@ class PrintedInversionMpc(Formulation):
     mode = ControlMode.INVERSION
 
     def __init__(self, linear: UnawareMpc, frictions: Sequence[Behaviour | None]) -> None:
-        """Wrap ``linear``; ``frictions`` has one entry per valve, None for a healthy one.
-
-        Raises:
-            InputError: a law that :mod:`.laws` does not know, or rate limits.
-        """
+        """Wrap ``linear``; ``frictions`` has one entry per valve, None for a healthy one."""
         if np.isfinite(linear.limits.move).any():
             raise InputError(
                 "the paper's inversion knows no rate limits",
@@ -61,3 +59,18 @@ class PrintedInversionMpc(Formulation):
         op = np.clip(op, limits[:, 0], limits[:, 1])
         self._before = op.copy()
         return dataclasses.replace(plan, op=op, process_input=wanted.copy())
+
+
+def as_printed(
+    tuning: PaperTuning,
+    mode: ControlMode,
+    unaware: UnawareMpc,
+    frictions: Sequence[Behaviour | None],
+) -> Formulation:
+    """Return the formulation of Section 4.2 to the letter; ``tuning`` is that of the embedding.
+
+    The others are as :attr:`~stiction_ros.control.design.ControlDesign.others` is called.
+    """
+    if mode is ControlMode.EMBEDDING:
+        return PrintedEmbeddingMpc(unaware.cost.model, tuning, unaware.limits, frictions)
+    return PrintedInversionMpc(unaware, frictions)

@@ -1,7 +1,6 @@
 """Friction laws that the paper's controllers take: those with a smoothed form and He's inverse.
 
-Kano's law, and the reconstruction of XCH's, know besides the stem which way it moves. A plan begins
-with the valve at rest, so the little that a moving stem would go on by itself is not planned with.
+A plan begins with the valve at rest, so what a moving stem would go on by itself is not planned.
 """
 
 from __future__ import annotations
@@ -18,14 +17,8 @@ from stiction_ros.errors import InputError
 PrintedFriction = HeStiction | KanoStiction | XchStiction
 
 
-def printed_frictions(
-    frictions: Sequence[Behaviour | None],
-) -> tuple[PrintedFriction | None, ...]:
-    """Return ``frictions`` when the paper's controllers can take all of them.
-
-    Raises:
-        InputError: another law.
-    """
+def printed_frictions(frictions: Sequence[Behaviour | None]) -> tuple[PrintedFriction | None, ...]:
+    """Return ``frictions`` when the paper's controllers can take all of them; else InputError."""
     known: list[PrintedFriction | None] = []
     for friction in frictions:
         if friction is not None and not isinstance(friction, PrintedFriction):
@@ -50,14 +43,10 @@ def smoothed_stem(
     figures: tuple[Any, Any, Any],
     tanh: Any,
 ) -> tuple[Any, Any]:
-    """Return the next stem and direction of motion by the smoothed law.
+    """Return the next stem and direction of motion by the smoothed law of ``friction``.
 
-    Args:
-        friction: names the law.
-        before: the stem, the OP and the direction one sample ago.
-        op: u_k.
-        figures: f_S, f_D and τ.
-        tanh: of numbers or of CasADi expressions, as the other arguments are.
+    ``before`` are stem, OP and direction one sample ago, ``figures`` f_S, f_D and τ; all are
+    numbers or CasADi expressions, as ``tanh`` takes them.
     """
     if directed(friction):
         found: tuple[Any, Any] = kano_step(before, op, figures, tanh)

@@ -21,15 +21,10 @@ DWELLS = {1: (1, 2, 4), 2: (1, 3), 3: (2,)}  # samples on the way-point, by stic
 
 @dataclasses.dataclass(frozen=True)
 class Route:
-    """How one sticky valve travels: not at all, at once, or by way of a point beyond.
+    """How one sticky valve travels: not at all, at once, or by way of a point beyond."""
 
-    Attributes:
-        direction: sign of the first move, 0 for staying.
-        dwell: samples on the way-point before the opposite move, 0 for no way-point.
-    """
-
-    direction: int
-    dwell: int = 0
+    direction: int  # sign of the first move, 0 for staying
+    dwell: int = 0  # samples on the way-point before the opposite move, 0 for no way-point
 
 
 class SearchedStart:
@@ -67,11 +62,7 @@ class SearchedStart:
 
 
 class _RouteProgramme:
-    """(22) for one route per sticky valve, in stems off the target: v = T r + v_0.
-
-    The penalty on OP counts where OP is the stem (healthy valves) or lies f_D beyond it
-    (samples that slip); at rest it is left out, as OP then is no unknown.
-    """
+    """(22) for one route per sticky valve, in stems off the target: v = T r + v_0."""
 
     def __init__(self, cost: AugmentedCost, limits: FloatArray, routes: dict[int, Route]) -> None:
         self._cost, self._limits, self._routes = cost, limits, routes

@@ -30,19 +30,12 @@ _LIMIT = "Maximum_Iterations_Exceeded"
 
 @dataclasses.dataclass(frozen=True)
 class ProgrammeResult:
-    """What IPOPT found.
+    """What IPOPT found."""
 
-    Attributes:
-        status: how it ended.
-        op: u over the horizon, shape (N, m), %, within the limits; None when failed.
-        cost: (22) under the smoothed model; inf when failed.
-        iterations: number of them.
-    """
-
-    status: ProgrammeStatus
-    op: FloatArray | None
-    cost: float
-    iterations: int
+    status: ProgrammeStatus  # how it ended
+    op: FloatArray | None  # u over the horizon, shape (N, m), %, in the limits; None when failed
+    cost: float  # (22) under the smoothed model; inf when failed
+    iterations: int  # number of them
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,15 +70,7 @@ class SmoothedProgramme:
         limits: FloatArray,
         soft: SoftOutputs | None = None,
     ) -> None:
-        """Build.
-
-        Args:
-            model: the process.
-            tuning: weights, τ and iteration limit.
-            frictions: one entry per valve, None for a healthy one.
-            limits: of stems and OP, shape (m, 2), %.
-            soft: bounds of the outputs; None for none.
-        """
+        """Build, for ``frictions`` with None for a healthy valve and ``limits``, (m, 2), %."""
         self.model, self.tuning, self._soft = model, tuning, soft
         self._sticky = [j for j, friction in enumerate(frictions) if friction is not None]
         pairs = [friction for friction in frictions if friction is not None]
@@ -159,12 +144,7 @@ class SmoothedProgramme:
         }
 
     def solve(self, situation: PlanProblem, op: FloatArray, stems: FloatArray) -> ProgrammeResult:
-        """Return the local optimum that IPOPT reaches.
-
-        Args:
-            situation: estimate and target.
-            op, stems: the start, shape (N, m) each, %, stems under the hard model.
-        """
+        """Return the optimum that IPOPT reaches from OP and stems by the hard model, (N, m), %."""
         target = situation.target
         state = situation.state - target.state
         parameters = (

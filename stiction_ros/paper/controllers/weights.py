@@ -44,25 +44,15 @@ class ProgrammeCost(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class AugmentedWeights:
-    """Penalties of (22) and the terminal penalty of (19a).
+    """Penalties of (22) and the terminal penalty of (19a)."""
 
-    Attributes:
-        horizon: N_H, samples.
-        stem: block of Q_z on χ_{i−1} − χ_ss, shape (m, m).
-        state: block of Q_z on ξ_i − ξ_ss, shape (n, n).
-        move: Q_s on Δχ, shape (m, m).
-        op: R on u_i − u_s, shape (m, m).
-        terminal: V_F on ξ_N − ξ_ss, shape (n, n).
-        op_move: S on Δu, shape (m, m), which (19a) has and (22) has not; None for none.
-    """
-
-    horizon: int
-    stem: FloatArray
-    state: FloatArray
-    move: FloatArray
-    op: FloatArray
-    terminal: FloatArray
-    op_move: FloatArray | None = None
+    horizon: int  # N_H, samples
+    stem: FloatArray  # block of Q_z on χ_{i−1} − χ_ss, shape (m, m)
+    state: FloatArray  # block of Q_z on ξ_i − ξ_ss, shape (n, n)
+    move: FloatArray  # Q_s on Δχ, shape (m, m)
+    op: FloatArray  # R on u_i − u_s, shape (m, m)
+    terminal: FloatArray  # V_F on ξ_N − ξ_ss, shape (n, n)
+    op_move: FloatArray | None = None  # S on Δu, (m, m), which (22) has not; None for none
 
     @property
     def in_stems(self) -> HorizonWeights:
@@ -72,21 +62,13 @@ class AugmentedWeights:
 
 @dataclasses.dataclass(frozen=True)
 class PaperTuning:
-    """The paper's own stiction-embedding controller.
+    """The paper's own stiction-embedding controller."""
 
-    Attributes:
-        weights: of (22).
-        warm_start: where the programme starts.
-        first_move: a of (21); the paper asks for a > 2.
-        smoothing: τ of (6), 1/%.
-        iterations: limit of IPOPT.
-    """
-
-    weights: AugmentedWeights
-    warm_start: WarmStart = WarmStart.COMPENSATION
-    first_move: float = 2.1
-    smoothing: float = 1e4
-    iterations: int = 100
+    weights: AugmentedWeights  # of (22)
+    warm_start: WarmStart = WarmStart.COMPENSATION  # where the programme starts
+    first_move: float = 2.1  # a of (21); the paper asks for a > 2
+    smoothing: float = 1e4  # τ of (6), 1/%
+    iterations: int = 100  # limit of IPOPT
 
 
 STATE_WEIGHT = 0.01

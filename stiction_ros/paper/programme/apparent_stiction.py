@@ -30,15 +30,10 @@ INVERSE_CONSTRAINT = np.array([[0.0, 0.0, 0.5], [0.0, -1.0, 0.0], [0.5, 0.0, 0.0
 
 @dataclasses.dataclass(frozen=True)
 class Ellipse:
-    """An ellipse through points (x, y).
+    """An ellipse through points (x, y)."""
 
-    Attributes:
-        chord: length of the chord through the centre along x; S_0 for x = OP, %.
-        misfit: RMS of (radius / radius of the ellipse − 1) over the points.
-    """
-
-    chord: float
-    misfit: float
+    chord: float  # length of the chord through the centre along x; S_0 for x = OP, %
+    misfit: float  # RMS of (radius / radius of the ellipse − 1) over the points
 
 
 def fit_ellipse(x: FloatArray, y: FloatArray) -> Ellipse | None:

@@ -1,12 +1,8 @@
 r"""(12a) as a function of the frictions alone: the coefficients are eliminated.
 
-For given frictions and delays the prediction (12c) is linear in θ, so the best θ is linear least
-squares, and
-
 .. math:: V(f) = \min_\theta \frac1p \sum_i \mathrm{SE}^{(i)}(f, \theta)
 
-has its minimum where (12) has it. What does not depend on f, past outputs and the constant, is
-projected out once.
+is linear least squares in θ. Past outputs and the constant are projected out once.
 """
 
 from __future__ import annotations
@@ -83,11 +79,7 @@ class Criterion:
         self._variance = np.maximum(table.record.op.var(axis=0), 1e-300)
 
     def __call__(self, friction: FloatArray) -> tuple[float, FloatArray]:
-        """Return V, squared engineering units, and σ²(χ) / σ²(u) per valve, shape (m,).
-
-        Args:
-            friction: rows (f_S, f_D), shape (m, 2), %.
-        """
+        """Return V, squared engineering units, and σ²(χ) / σ²(u) per valve, shape (m,)."""
         key = np.round(friction, 9).tobytes()
         if key not in self._kept:
             if len(self._kept) >= KEPT:

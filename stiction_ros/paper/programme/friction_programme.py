@@ -46,25 +46,15 @@ IPOPT = {
 
 @dataclasses.dataclass(frozen=True)
 class Solution:
-    """One end of IPOPT; a failure is a value.
+    """One end of IPOPT; a failure is a value."""
 
-    Attributes:
-        x: scaled unknowns, shape (2m + p (n_a + m n_b + 1),).
-        friction: rows (f_S, f_D), shape (m, 2), %.
-        objective: (12a), squared engineering units.
-        status: IPOPT's own word.
-        iterations: of IPOPT.
-        feasible: whether all constraints hold.
-        stable: whether every identified A(q) has its roots inside the unit circle.
-    """
-
-    x: FloatArray
-    friction: FloatArray
-    objective: float
-    status: str
-    iterations: int
-    feasible: bool
-    stable: bool
+    x: FloatArray  # scaled unknowns, shape (2m + p (n_a + m n_b + 1),)
+    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
+    objective: float  # (12a), squared engineering units
+    status: str  # IPOPT's own word
+    iterations: int  # of IPOPT
+    feasible: bool  # whether all constraints hold
+    stable: bool  # whether every identified A(q) has its roots inside the unit circle
 
     @property
     def accepted(self) -> bool:
@@ -89,9 +79,7 @@ class FrictionProgramme:
     def fitted(self, friction: FloatArray, smoothing: FloatArray) -> tuple[FloatArray, float]:
         """Return unknowns with the least-squares coefficients of these frictions, and (12a).
 
-        Args:
-            friction: rows (f_S, f_D), shape (m, 2), %.
-            smoothing: τ of every valve, shape (m,), 1/%.
+        The frictions are rows (f_S, f_D), shape (m, 2), %; τ is one a valve, 1/%.
         """
         span, data = self.data.op_span, self.data
         stems = np.array(self._stems(friction / span[:, None], smoothing * span))
@@ -110,14 +98,7 @@ class FrictionProgramme:
         return x, total / self.frame.outputs
 
     def solve(self, x: FloatArray, smoothing: FloatArray) -> Solution:
-        """Run IPOPT once, then solve the coefficients with the frictions held.
-
-        The last is linear least squares; it completes what an iteration limit cut short.
-
-        Args:
-            x: start.
-            smoothing: τ of every valve, shape (m,), 1/%.
-        """
+        """Run IPOPT once from ``x``, then solve the coefficients with the frictions held."""
         count = 2 * self.frame.valves
         low, high = np.full(self.frame.size, -np.inf), np.full(self.frame.size, np.inf)
         low[:count], high[:count] = 0.0, np.repeat(self.data.limit / self.data.op_span, 2)
@@ -191,11 +172,7 @@ class FrictionProgramme:
         return ca.nlpsol("friction", "ipopt", problem, options)
 
     def _terms(self, x: Any, about: Any, smoothing: Any, order: int) -> tuple[Any, Any]:
-        """Return (12a) over its value at the ARX start, and (12e), then (12f), of every valve.
-
-        These are f_S − f_D and σ²(χ)/(α σ²(u)) − 1, for stems expanded to ``order`` in the
-        frictions about those given.
-        """
+        """Return (12a) over its start's value, f_S − f_D (12e) and σ²(χ)/(α σ²(u)) − 1 (12f)."""
         count, valves = self.data.op.shape[1], self.frame.valves
         stems = [self._stem(j, x, about, smoothing, order) for j in range(valves)]
         total = sum(ca.sumsqr(self._residual(i, x, stems)) for i in range(self.frame.outputs))

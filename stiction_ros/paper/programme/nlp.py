@@ -1,8 +1,6 @@
 """The nonlinear programme (12) within the paper's M × T runs of IPOPT.
 
-Every run solves the programme in the frictions alone (:mod:`.reduced_programme`). Points of the
-border, of the line of S_0 and from inside the triangle are ranked by their own (12a), one
-linear least squares each; none of them is a round number on purpose. Then, until M runs for each
+Points of the triangle are ranked by their own (12a). Then, until M runs for each
 of T choices of delays are spent:
 
 1. every choice of delays is solved from its best points, far apart, with a third of the runs;
@@ -22,14 +20,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.paper.one_step_result import (
-    Answer,
-    check_record,
-    delay_choices,
-    evaluated,
-    friction_limits,
-    result,
-)
+from stiction_ros.paper import one_step_result as one_step
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.apparent_stiction import apparent_stictions
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
@@ -74,24 +65,13 @@ def identify_by_programme(
 ) -> PaperIdentification:
     """Identify by the nonlinear programme (12); see the module for the order of work.
 
-    Args:
-        record: what was measured.
-        options: orders, delay range, ``starts``; None for the defaults.
-        progress: called with the share done, 0 to 1.
-
-    Returns:
-        Point estimates without a verdict, and in ``search`` every run with its end. Its
-        status is ``no_model`` when no run ended feasible with a stable process.
-
-    Raises:
-        InputError: a record that no model can be fitted to, or more than ``MAX_CHOICES``
-            choices of delays.
+    The status is ``no_model`` when no run ended feasible with a stable process.
     """
     begun = time.perf_counter()
     options = options or PaperOptions()
     search = _Search(record, options, progress or (lambda share: None))
     best = search.run()
-    answer = Answer(
+    answer = one_step.Answer(
         "" if best else NO_END,
         best.solution.friction if best else np.zeros((len(record.valves), 2)),
         best.delays if best else search.choices[0],
@@ -99,15 +79,15 @@ def identify_by_programme(
         sum(one.criterion.evaluations for one in search.programmes.values()),
         starts=tuple(search.log),
     )
-    return result(record, options, answer, time.perf_counter() - begun)
+    return one_step.result(record, options, answer, time.perf_counter() - begun)
 
 
 class _Search:
     def __init__(self, record: Record, options: PaperOptions, progress: Progress) -> None:
         self.record, self.options, self.progress = record, options, progress
-        orders = check_record(record, options)
-        self.choices = delay_choices(record, options, MAX_CHOICES)
-        limits = friction_limits(record, options)
+        orders = one_step.check_record(record, options)
+        self.choices = one_step.delay_choices(record, options, MAX_CHOICES)
+        limits = one_step.friction_limits(record, options)
         self.table = StemTable(record, limits, orders, options.law)
         self.programmes = {
             delays: ReducedProgramme(Criterion(self.table, delays)) for delays in self.choices
@@ -184,7 +164,7 @@ class _Search:
     def _solve(self, start: Start, delays: Delays, width: float) -> None:
         start = self._released(start, self.programmes[delays].criterion)
         solution = self.programmes[delays].solve(start.friction, width)
-        fits = evaluated(self.record, self.options, solution.friction, delays).fits
+        fits = one_step.evaluated(self.record, self.options, solution.friction, delays).fits
         stable = max(fit.largest_root for fit in fits) < 1.0
         self._tried[delays] += [start.friction, solution.friction]
         self.ends.append(_End(delays, solution, stable))

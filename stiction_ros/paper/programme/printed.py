@@ -1,8 +1,6 @@
 """The paper's method to the letter: the programme (12) from M printed starts, for T delays.
 
-M × T runs of IPOPT at τ = 10⁴, each over frictions and coefficients together with exact
-derivatives, from the border of the triangle, the line of S_0 and the ARX start (15). The best
-feasible, stable end wins. :mod:`.nlp` spends as many runs better.
+The best feasible, stable end of M × T runs of IPOPT at τ = 10⁴ wins; :mod:`.nlp` uses them better.
 """
 
 from __future__ import annotations
@@ -12,13 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from stiction_ros.paper.one_step_result import (
-    Answer,
-    check_record,
-    delay_choices,
-    friction_limits,
-    result,
-)
+from stiction_ros.paper import one_step_result as one_step
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.apparent_stiction import apparent_stictions
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme, Solution
@@ -39,9 +31,9 @@ def identify_as_printed(
     """Identify by the method as printed; all else is as in :func:`~.nlp.identify_by_programme`."""
     begun = time.perf_counter()
     options = options or PaperOptions(method="nlp_printed")
-    orders = check_record(record, options)
-    choices = delay_choices(record, options, MAX_CHOICES)
-    limits = friction_limits(record, options)
+    orders = one_step.check_record(record, options)
+    choices = one_step.delay_choices(record, options, MAX_CHOICES)
+    limits = one_step.friction_limits(record, options)
     stictions = np.minimum(apparent_stictions(record), limits)
     starts = draw_starts(limits, stictions, options.starts)
     smoothing = final_smoothing(limits)
@@ -72,5 +64,5 @@ def identify_as_printed(
     delays, best = min(accepted or ends, key=lambda one: one[1].objective)
     friction = best.friction if accepted else np.zeros((len(limits), 2))
     reason = "" if accepted else NO_END
-    answer = Answer(reason, friction, delays, best.objective, len(ends), starts=tuple(log))
-    return result(record, options, answer, time.perf_counter() - begun)
+    answer = one_step.Answer(reason, friction, delays, best.objective, len(ends), starts=tuple(log))
+    return one_step.result(record, options, answer, time.perf_counter() - begun)

@@ -14,26 +14,16 @@ from stiction_ros.signals.arx_fit import ArxFit, ArxOrders, Delays, regressors, 
 
 @dataclasses.dataclass(frozen=True)
 class ProgrammeData:
-    """What all delays share.
+    """What all delays share."""
 
-    Attributes:
-        op: OP about its mean over its span, shape (m, N).
-        pv: PV about its mean, engineering units, shape (p, N).
-        op_mean, op_span: shape (m,), %.
-        pv_mean: shape (p,).
-        limit: f_max = Δu of every valve, shape (m,), %.
-        orders: n_a, n_b, ε.
-        stems: sensitivities for N samples.
-    """
-
-    op: FloatArray
-    pv: FloatArray
-    op_mean: FloatArray
+    op: FloatArray  # OP about its mean over its span, shape (m, N)
+    pv: FloatArray  # PV about its mean, engineering units, shape (p, N)
+    op_mean: FloatArray  # op_mean, op_span: shape (m,), %
     op_span: FloatArray
-    pv_mean: FloatArray
-    limit: FloatArray
-    orders: ArxOrders
-    stems: StemSensitivities
+    pv_mean: FloatArray  # shape (p,)
+    limit: FloatArray  # f_max = Δu of every valve, shape (m,), %
+    orders: ArxOrders  # n_a, n_b, ε
+    stems: StemSensitivities  # sensitivities for N samples
 
     @classmethod
     def of(
@@ -53,22 +43,14 @@ class Frame:
     The unknowns are f_S and f_D of every valve over the span of OP, then for every output z
     with θ = θ_0 + T z, where θ_0 is the ARX start (15) and T whitens its regressors. Coefficients
     beyond the orders of their channel are 0 in θ_0 and T, and their entries of z are held.
-
-    Attributes:
-        data: what all delays share.
-        delays: for each output the t_d of each valve, samples.
-        theta: θ_0 per output, (a, b, c), shape (n_a + m n_b + 1,).
-        basis: T per output.
-        past: columns −y_{k−1} … −y_{k−n_a} per output, shape (N − ε, n_a).
-        start_error: (12a) at θ_0 with χ = u, squared engineering units.
     """
 
-    data: ProgrammeData
-    delays: Delays
-    theta: tuple[FloatArray, ...]
-    basis: tuple[FloatArray, ...]
-    past: tuple[FloatArray, ...]
-    start_error: float
+    data: ProgrammeData  # what all delays share
+    delays: Delays  # for each output the t_d of each valve, samples
+    theta: tuple[FloatArray, ...]  # θ_0 per output, (a, b, c), shape (n_a + m n_b + 1,)
+    basis: tuple[FloatArray, ...]  # T per output
+    past: tuple[FloatArray, ...]  # columns −y_{k−1} … −y_{k−n_a} per output, shape (N − ε, n_a)
+    start_error: float  # (12a) at θ_0 with χ = u, squared engineering units
 
     @classmethod
     def of(cls, data: ProgrammeData, delays: Delays) -> Frame:

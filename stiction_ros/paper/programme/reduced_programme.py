@@ -4,10 +4,8 @@ r"""The programme (12) in the frictions alone, solved by IPOPT with slopes over 
     \min_{f} V(f) \quad \text{s.t.} \quad f_S \ge f_D, \quad
     0 \le f_S, f_D \le \Delta u, \quad \sigma^2(\hat\chi) \ge \alpha \, \sigma^2(u)
 
-V is piecewise constant in f_S at τ = 10⁴, so its derivative says nothing. IPOPT is given the
-difference quotient over a width instead, which is the slope of V averaged over that width; the
-width shrinks from one gradient to the next. The line search sees V itself, and the best point that
-was evaluated is the answer, wherever IPOPT ends.
+V is piecewise constant in f_S at τ = 10⁴, so IPOPT is given the slope of V averaged over a width
+that shrinks. The best point that was evaluated is the answer.
 """
 
 from __future__ import annotations
@@ -50,20 +48,14 @@ IPOPT = {
 
 @dataclasses.dataclass(frozen=True)
 class ReducedSolution:
-    """Where one run of IPOPT came to.
+    """Where one run of IPOPT came to."""
 
-    Attributes:
-        friction: rows (f_S, f_D), shape (m, 2), %; the best feasible point evaluated, or the
-            start where none was feasible.
-        objective: V there, squared engineering units; inf where nothing was feasible.
-        status: IPOPT's own word.
-        iterations: of IPOPT.
-    """
-
+    # rows (f_S, f_D), shape (m, 2), %; the best feasible point evaluated, or the start where none
+    # was feasible
     friction: FloatArray
-    objective: float
-    status: str
-    iterations: int
+    objective: float  # V there, squared engineering units; inf where nothing was feasible
+    status: str  # IPOPT's own word
+    iterations: int  # of IPOPT
 
     @property
     def feasible(self) -> bool:
@@ -84,12 +76,7 @@ class ReducedProgramme:
         self._solver = self._build()
 
     def solve(self, friction: FloatArray, width: float) -> ReducedSolution:
-        """Run IPOPT once.
-
-        Args:
-            friction: start, rows (f_S, f_D), shape (m, 2), %.
-            width: of the first difference quotients, share of f_max.
-        """
+        """Run IPOPT once from rows (f_S, f_D), shape (m, 2), %; ``width`` is a share of f_max."""
         static, dynamic = np.asarray(friction, dtype=float).T / self.limits
         x = np.column_stack([static - dynamic, static + dynamic]).ravel()
         self._scale, self._width, self._best = 1.0, width, None

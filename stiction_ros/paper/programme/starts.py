@@ -1,8 +1,4 @@
-"""Where the nonlinear programme starts.
-
-As printed: the border of the triangle and a few points of the line f_S + f_D = S_0. For the search
-of :mod:`.nlp` points inside the triangle are added, and all are ranked by their own (12a).
-"""
+"""Where the nonlinear programme starts: border and line f_S + f_D = S_0 as printed, and inside."""
 
 from __future__ import annotations
 
@@ -32,15 +28,10 @@ class StartKind(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Start:
-    """A first guess of the frictions.
+    """A first guess of the frictions."""
 
-    Attributes:
-        kind: where it comes from.
-        friction: rows (f_S, f_D), shape (m, 2), %.
-    """
-
-    kind: StartKind
-    friction: FloatArray
+    kind: StartKind  # where it comes from
+    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
 
 
 def border(limit: float, step: float = STEP) -> FloatArray:
@@ -68,22 +59,15 @@ def stiction_line(stiction: float, limit: float, count: int) -> FloatArray:
 
 
 def inside(limit: float, count: int) -> FloatArray:
-    """Return ``count`` points spread evenly over the triangle, shape (count, 2), %.
-
-    None of them is a round number but by accident, so that a round truth has no advantage.
-    """
+    """Return ``count`` points, none of them round, over the triangle, shape (count, 2), %."""
     square = (0.5 + np.arange(1, count + 1)[:, None] * EVEN) % 1.0
     return limit * np.column_stack([square.max(axis=1), square.min(axis=1)])
 
 
 def around(friction: FloatArray, limits: FloatArray, reach: float, count: int) -> list[FloatArray]:
-    """Return ``count`` points about each valve's friction, the others held, each of shape (m, 2).
+    """Return up to ``count`` points about each valve's friction, others held, (m, 2) each.
 
-    Args:
-        friction: rows (f_S, f_D), shape (m, 2), %.
-        limits: f_max per valve, shape (m,), %.
-        reach: how far J = f_S − f_D and f_S + f_D may go, share of f_max.
-        count: points per valve; those outside the triangle are left out.
+    J = f_S − f_D and f_S + f_D go as far as ``reach``, a share of f_max.
     """
     found = []
     moves = 2.0 * ((0.5 + np.arange(1, count + 1)[:, None] * EVEN) % 1.0) - 1.0
@@ -105,11 +89,6 @@ def draw_starts(limits: FloatArray, stictions: FloatArray, count: int) -> tuple[
     border. With several valves, valve j takes the list moved on by j, so that the valves do
     not all start at the same kind of point. A valve without an ellipse (S_0 = 0) starts
     on the border only.
-
-    Args:
-        limits: f_max per valve, shape (m,), %.
-        stictions: S_0 per valve, shape (m,), %; 0 where no ellipse was found.
-        count: M ≥ 1.
     """
     on_line = min(MAX_LINE, count // 2)
     rows, kinds = [], []
@@ -127,10 +106,8 @@ def draw_starts(limits: FloatArray, stictions: FloatArray, count: int) -> tuple[
 def candidates(limits: FloatArray, stictions: FloatArray, count: int) -> tuple[Start, ...]:
     """Return points to choose starts from: one valve has friction, the others have none.
 
-    Args:
-        limits: f_max per valve, shape (m,), %.
-        stictions: S_0 per valve, shape (m,), %; 0 where no ellipse was found.
-        count: points inside the widest triangle; the others have as many for their area.
+    S_0, %, is 0 without an ellipse; ``count`` points lie inside the widest triangle, as many
+    for their area in the others.
     """
     found = [Start(StartKind.BORDER, np.zeros((len(limits), 2)))]
     for j, (limit, stiction) in enumerate(zip(limits.tolist(), stictions.tolist(), strict=True)):

@@ -8,9 +8,6 @@ law (5)-(6) it is the only one. Then first and second derivatives in f = (f_S, f
     \partial_{pq} \chi_k &= F_{\chi\chi} \, \partial_p \chi_{k-1} \partial_q \chi_{k-1}
         + F_{\chi p} \, \partial_q \chi_{k-1} + F_{\chi q} \, \partial_p \chi_{k-1} + F_{pq}
         + F_\chi \, \partial_{pq} \chi_{k-1}
-
-so value, gradient and Hessian of anything built on the stem cost one forward sweep each,
-whatever the number of samples, and are exact.
 """
 
 from __future__ import annotations
@@ -94,13 +91,8 @@ class StemSensitivities:
     def expression(self, order: int, op: FloatArray, parameters: Any) -> list[Any]:
         """Return χ and its derivatives up to ``order`` as rows of shape (1, N).
 
-        Args:
-            order: 0, 1 or 2.
-            op: shape (N,); the stem before the first sample is the first OP.
-            parameters: expression of shape (3, 1): f_S, f_D and τ in the units of ``op``.
-
-        Returns:
-            χ; then ∂χ/∂f_S, ∂χ/∂f_D; then the second derivatives in the order of ``SECOND``.
+        They are ∂χ/∂f_S, ∂χ/∂f_D; then the second derivatives as in ``SECOND``. The stem before
+        the first sample is the first OP, shape (N,); ``parameters`` are f_S, f_D, τ, shape (3, 1).
         """
         blocks = self._blocks[order]
         state = np.zeros(blocks[0].size1_in(0))

@@ -12,13 +12,7 @@ from mcap.writer import CompressionType, Writer
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.run_metadata import RUN, custom_data, merged
-from stiction_ros.records.storage.bag_metadata import (
-    BagFile,
-    BagTopic,
-    bag_information,
-    metadata_record,
-    metadata_yaml,
-)
+from stiction_ros.records.storage import bag_metadata as metadata
 from stiction_ros.records.storage.files import METADATA, found_files
 from stiction_ros.records.storage.log_time import SIMULATED
 from stiction_ros.records.storage.mcap_scan import McapScan
@@ -34,15 +28,7 @@ COMPRESSIONS = {
 
 @dataclasses.dataclass(frozen=True)
 class Packing:
-    """How a finished file is packed.
-
-    Attributes:
-        compression: ``zstd``, ``lz4`` or ``none``.
-        chunk_size: bytes of messages in one chunk before compression.
-
-    Raises:
-        InputError: another compression.
-    """
+    """How a finished file is packed: ``zstd``, ``lz4`` or ``none``, and bytes in a chunk."""
 
     compression: str = "zstd"
     chunk_size: int = 1 << 18
@@ -57,23 +43,14 @@ class Packing:
 
 @dataclasses.dataclass(frozen=True)
 class FileContent:
-    """What one storage file holds.
+    """What one storage file holds."""
 
-    Attributes:
-        file: its name, counts and times.
-        topics: in the order they were announced.
-        run: what its metadata records say of the run.
-        finished: whether its writer closed it.
-        damaged: whether something in it is broken.
-        notes: what was left out, one sentence each.
-    """
-
-    file: BagFile
-    topics: tuple[BagTopic, ...]
-    run: Mapping[str, str]
-    finished: bool
-    damaged: bool
-    notes: tuple[str, ...]
+    file: metadata.BagFile  # its name, counts and times
+    topics: tuple[metadata.BagTopic, ...]  # in the order they were announced
+    run: Mapping[str, str]  # what its metadata records say of the run
+    finished: bool  # whether its writer closed it
+    damaged: bool  # whether something in it is broken
+    notes: tuple[str, ...]  # what was left out, one sentence each
 
 
 def storage_path(directory: Path, number: int = 0) -> Path:
@@ -84,15 +61,9 @@ def storage_path(directory: Path, number: int = 0) -> Path:
 def finish_bag(directory: str | Path, packing: Packing = Packing()) -> tuple[str, ...]:
     """Rewrite the journals of a bag chunked and indexed and write its ``metadata.yaml``.
 
-    Where there is a simulated time, what was received before it was known (configurations,
-    latched topics) came at wall time, years away; it gets the first simulated time.
-
-    A journal is replaced when the new file is complete on the disk, so that a second kill
-    loses nothing either.
-
-    Args:
-        directory: a bag whose writer has ended, by itself or by a kill.
-        packing: of the finished files.
+    What was received before simulated time was known (configurations, latched topics) came at wall
+    time, years away; it gets the first simulated time. A journal is replaced when the new file is
+    complete on the disk, so that a second kill loses nothing either.
 
     Returns:
         What was left out, one sentence each; empty when nothing was.
@@ -112,8 +83,7 @@ def finish_bag(directory: str | Path, packing: Packing = Packing()) -> tuple[str
 def log_time_caps(files: Sequence[Path]) -> list[int | None]:
     """Return for each file the log time, ns, that what came before simulated time gets.
 
-    It is the first simulated time, for the files up to the one in which it is; None for those
-    behind it, and for all when the bag knows no simulated time.
+    It is the first simulated time up to the file in which that is; else None.
     """
     found: tuple[int, int] | None = None
     for number, file in enumerate(files):
@@ -137,15 +107,8 @@ def rewrite(
 ) -> FileContent:
     """Rewrite one file chunked and indexed, in its place.
 
-    Args:
-        path: the file, a journal for example.
-        packing: of the new file.
-        cap: first simulated time of the bag, ns; until it comes messages get it as log time.
-        salvage: leave out what is damaged, with a note, instead of raising.
-
-    Raises:
-        InputError: damaged.
-        OSError: the storage refuses.
+    Messages get ``cap``, the first simulated time of the bag, ns, as log time until it comes. To
+    ``salvage`` is to leave out what is damaged, with a note, instead of raising.
     """
     scan = McapScan(path, salvage=salvage)
     partial = path.with_suffix(".mcap.part")
@@ -165,7 +128,7 @@ def rewrite(
             for name, mapping in scan.metadata:
                 if name not in (RUN, ROSBAG2):
                     target.add_metadata(name, mapping)
-            target.add_metadata(ROSBAG2, metadata_record(_information([content])))
+            target.add_metadata(ROSBAG2, metadata.metadata_record(_information([content])))
             target.finish()  # type: ignore[no-untyped-call]
             output.flush()
             os.fsync(output.fileno())
@@ -177,7 +140,7 @@ def rewrite(
 
 def write_listing(directory: Path, contents: Sequence[FileContent]) -> None:
     """Write ``metadata.yaml`` for the files of a bag, one at least, in their order."""
-    text = metadata_yaml(_information(contents))
+    text = metadata.metadata_yaml(_information(contents))
     partial = directory / f"{METADATA}.part"
     with partial.open("w", encoding="utf-8") as stream:
         stream.write(text)
@@ -186,10 +149,10 @@ def write_listing(directory: Path, contents: Sequence[FileContent]) -> None:
     os.replace(partial, directory / METADATA)  # a reader sees the old one or the new one
 
 
-def _copy(scan: McapScan, target: Writer, cap: int | None) -> BagFile:
+def _copy(scan: McapScan, target: Writer, cap: int | None) -> metadata.BagFile:
     """Copy all messages and topics; return what was written."""
     schemas: dict[tuple[str, str, str], int] = {}
-    channels: dict[BagTopic, int] = {}
+    channels: dict[metadata.BagTopic, int] = {}
     counts: Counter[str] = Counter()
     first: int | None = None
     last: int | None = None
@@ -220,10 +183,10 @@ def _copy(scan: McapScan, target: Writer, cap: int | None) -> BagFile:
         first = log_time if first is None else min(first, log_time)
         last = log_time if last is None else max(last, log_time)
     announce()
-    return BagFile(scan.path.name, counts, first, last)
+    return metadata.BagFile(scan.path.name, counts, first, last)
 
 
-def content_of(file: BagFile, scan: McapScan) -> FileContent:
+def content_of(file: metadata.BagFile, scan: McapScan) -> FileContent:
     """Return what a file holds after a scan of all its messages."""
     topics = tuple(scan.topics.values())
     run = merged(scan.metadata)
@@ -231,11 +194,11 @@ def content_of(file: BagFile, scan: McapScan) -> FileContent:
 
 
 def _information(contents: Sequence[FileContent]) -> dict[str, object]:
-    topics: dict[str, BagTopic] = {}
+    topics: dict[str, metadata.BagTopic] = {}
     run: dict[str, str] = {}
     for content in contents:
         run.update(content.run)
         for topic in content.topics:
             topics.setdefault(topic.name, topic)
     files = [content.file for content in contents]
-    return bag_information(files, list(topics.values()), custom=custom_data(run))
+    return metadata.bag_information(files, list(topics.values()), custom=custom_data(run))

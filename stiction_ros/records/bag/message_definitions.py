@@ -26,14 +26,10 @@ def default_prefixes() -> tuple[str, ...]:
 
 
 def definition(type_name: str) -> tuple[str, str]:
-    """Return a message's definition as a bag holds it, and the hash of its type.
+    """Return the definition of a message, as ``sensor_msgs/msg/JointState``, and its hash.
 
-    Args:
-        type_name: ``sensor_msgs/msg/JointState`` or ``sensor_msgs/JointState``.
-
-    Returns:
-        The text of the ``.msg`` file followed by those it depends on, each after a line
-        of 80 ``=`` and ``MSG: package/Name``; and the ``RIHS01_…`` hash.
+    It is the text of the ``.msg`` file followed by those it needs, each after a line of 80 ``=``
+    and ``MSG: package/Name``; the hash is ``RIHS01_…``.
 
     Raises:
         InputError: no such message under :func:`default_prefixes`.

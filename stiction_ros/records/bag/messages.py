@@ -25,21 +25,13 @@ Wanted = Callable[[BagTopic], bool]
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class BagMessage:
-    """One decoded message.
+    """One decoded message."""
 
-    Attributes:
-        topic: full topic name.
-        type: ``sensor_msgs/msg/JointState``.
-        log_time: when it was received, ns.
-        publish_time: when it was sent, ns.
-        message: its fields as attributes.
-    """
-
-    topic: str
-    type: str
-    log_time: int
-    publish_time: int
-    message: Any
+    topic: str  # full topic name
+    type: str  # ``sensor_msgs/msg/JointState``
+    log_time: int  # when it was received, ns
+    publish_time: int  # when it was sent, ns
+    message: Any  # its fields as attributes
 
 
 def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMessage]:
@@ -65,11 +57,7 @@ def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMe
 
 
 def _by_log_time(scan: McapScan) -> Iterator[RawMessage]:
-    """Yield the messages of a file by log time, those of one log time as they stand in the file.
-
-    A journal keeps the order in which it was written: its log times are of the wall until simulated
-    time is known, and never out of order. So does a file in which log time begins anew.
-    """
+    """Yield the messages of a file by log time, those of one log time as they stand in the file."""
     held: list[RawMessage] = []
     damage = None
     try:
@@ -85,11 +73,7 @@ def _by_log_time(scan: McapScan) -> Iterator[RawMessage]:
 
 
 def _begins_anew(messages: Iterable[RawMessage]) -> bool:
-    """Tell whether log time begins anew, as simulated time does when a plant is restarted.
-
-    Then older times of a topic come one after the other, and fall between those that it had
-    before. By log time such runs would be mixed.
-    """
+    """Tell whether log time begins anew, as simulated time does when a plant is restarted."""
     known: dict[str, list[int]] = {}
     older: dict[str, list[int]] = {}
     for topic, time, _, _ in messages:
@@ -113,12 +97,9 @@ def _begins_anew(messages: Iterable[RawMessage]) -> bool:
 def read_messages(
     path: str | Path, *, wanted: Wanted | None = None, notes: list[str] | None = None
 ) -> Iterator[BagMessage]:
-    """Yield the decoded messages of a bag in the order of :func:`read_raw`.
+    """Yield the decoded messages, of the topics ``wanted``, in the order of :func:`read_raw`.
 
-    Args:
-        path: as there.
-        wanted: which topics to decode and yield; all when not given.
-        notes: as there; with topics that are not in CDR with ``ros2msg`` definitions.
+    Notes tell, too, of topics that are not in CDR with ``ros2msg`` definitions.
 
     Raises:
         InputError: no such bag, damaged, or a message that does not fit its definition.
@@ -134,11 +115,7 @@ def read_messages(
 
 
 class MessageDecoder:
-    """Decodes messages by the definitions that the bag carries.
-
-    Attributes:
-        notes: topics that could not be decoded, one sentence each.
-    """
+    """Decodes messages by the definitions of the bag; ``notes`` tell which topics it could not."""
 
     def __init__(self) -> None:
         self.notes: list[str] = []
@@ -146,11 +123,7 @@ class MessageDecoder:
         self._decoders: dict[BagTopic, Callable[[bytes], Any] | None] = {}
 
     def decode(self, raw: RawMessage, where: str) -> BagMessage | None:
-        """Return the message; None when its topic has no definition to decode it by.
-
-        Raises:
-            InputError: its bytes do not fit the definition.
-        """
+        """Return the message; None without a definition, InputError when it does not fit."""
         topic = raw.topic
         if topic not in self._decoders:
             self._decoders[topic] = self._decoder(topic)

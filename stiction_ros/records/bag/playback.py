@@ -27,20 +27,13 @@ _NUMBERED = {
 
 @dataclasses.dataclass(frozen=True)
 class BagContent:
-    """What there is to play in a bag.
+    """What there is to play in a bag."""
 
-    Attributes:
-        messages: in the order of the bag.
-        topics: by name.
-        first, last: least and largest log time, ns.
-        notes: what was left out while reading, one sentence each.
-    """
-
-    messages: Sequence[RawMessage]
-    topics: Mapping[str, BagTopic]
-    first: int
+    messages: Sequence[RawMessage]  # in the order of the bag
+    topics: Mapping[str, BagTopic]  # by name
+    first: int  # first, last: least and largest log time, ns
     last: int
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what was left out while reading, one sentence each
 
     @property
     def seconds(self) -> float:
@@ -49,11 +42,7 @@ class BagContent:
 
 
 def bag_content(path: str | Path, wanted: str = ".*") -> BagContent:
-    """Read a bag.
-
-    Args:
-        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
-        wanted: regular expression of the full topic names that count.
+    """Read the messages of a bag whose full topic names the regular expression ``wanted`` matches.
 
     Raises:
         InputError: no such bag, damaged, no regular expression, or no message to play.
@@ -79,13 +68,14 @@ def offered_qos(topic: BagTopic) -> Qos:
     Where several publishers offered different profiles it is reliable, or transient local, as
     soon as one of them was, with the largest depth. Without a recorded profile it is reliable
     and volatile. Deadlines and lifespans are not offered: a replay does not keep them.
-
-    Raises:
-        InputError: the recorded profiles cannot be read.
     """
     try:
         profiles = [
-            {key: _word(key, profile.get(key, 0)) for key in _NUMBERED}
+            {
+                key: value.lower() if isinstance(value, str) else words[int(str(value))]
+                for key, words in _NUMBERED.items()
+                for value in (profile.get(key, 0),)
+            }
             | {"depth": int(profile.get("depth", 0))}
             for profile in yaml.safe_load(topic.qos_yaml or "[]") or []
         ]
@@ -106,10 +96,6 @@ def offered_qos(topic: BagTopic) -> Qos:
     )
 
 
-def _word(key: str, value: object) -> str:
-    return value.lower() if isinstance(value, str) else _NUMBERED[key][int(str(value))]
-
-
 class Playback:
     """Plays the messages of a bag in their order, each when its log time has come.
 
@@ -120,11 +106,8 @@ class Playback:
         content: of the bag.
         clock: a steady clock, ns.
         rate: recorded seconds per second of the clock, above 0.
-        start: seconds of recorded time that are passed over at the beginning.
+        start: seconds of recorded time that are passed over at the beginning, within the bag.
         loop: whether to begin again at the end.
-
-    Raises:
-        InputError: a rate that is not positive, or a start beyond the end.
     """
 
     def __init__(
@@ -179,10 +162,7 @@ class Playback:
         self.paused = False
 
     def next_messages(self) -> list[RawMessage]:
-        """Return every message of the next log time.
-
-        Only a paused playback steps; a running one returns nothing.
-        """
+        """Return every message of the next log time; a running playback gives none."""
         found: list[RawMessage] = []
         if not self.paused:
             return found
@@ -214,13 +194,10 @@ class Playback:
         if self._place == len(self._messages):
             if self._loop:
                 self.rounds += 1
-                self._rewind()
+                self._bag_time, self._since, self._place = self._begin, self._clock(), 0
             else:
                 self._bag_time, self.finished = max(self.time, message.log_time), True
         return message
-
-    def _rewind(self) -> None:
-        self._bag_time, self._since, self._place = self._begin, self._clock(), 0
 
     def _anchor(self) -> None:
         self._bag_time, self._since = self.time, self._clock()

@@ -10,14 +10,7 @@ from collections import Counter
 from pathlib import Path
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.finish import (
-    FileContent,
-    Packing,
-    content_of,
-    log_time_caps,
-    rewrite,
-    write_listing,
-)
+from stiction_ros.records.bag import finish
 from stiction_ros.records.storage.bag_metadata import BagFile
 from stiction_ros.records.storage.files import METADATA, found_files, listing_notes, refuse_foreign
 from stiction_ros.records.storage.mcap_scan import McapScan
@@ -34,34 +27,22 @@ class RepairStatus(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Repair:
-    """What a repair found and did.
+    """What a repair found and did."""
 
-    Attributes:
-        status: ``whole``: nothing was wrong; ``finished``: files that their writer had not
-            closed were finished, or ``metadata.yaml`` was made anew; ``salvaged``: damaged
-            records were left out.
-        files: names of the storage files, in order.
-        rewritten: those that were rewritten.
-        messages: messages by topic in the bag as it is now.
-        notes: what was wrong, one sentence each.
-    """
-
+    # ``whole``: nothing was wrong; ``finished``: files that their writer had not closed were
+    # finished, or ``metadata.yaml`` was made anew; ``salvaged``: damaged records were left out
     status: RepairStatus
-    files: tuple[str, ...]
-    rewritten: tuple[str, ...]
-    messages: dict[str, int]
-    notes: tuple[str, ...]
+    files: tuple[str, ...]  # names of the storage files, in order
+    rewritten: tuple[str, ...]  # those that were rewritten
+    messages: dict[str, int]  # messages by topic in the bag as it is now
+    notes: tuple[str, ...]  # what was wrong, one sentence each
 
 
-def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noqa: B008 (frozen)
-    """Repair a bag in its place.
+def repair_bag(path: str | Path, packing: finish.Packing = finish.Packing()) -> Repair:  # noqa: B008 (frozen)
+    """Repair a bag, a rosbag2 directory or one ``.mcap`` file, in its place.
 
     A file that was damaged is kept beside the new one, as ``….mcap.damaged``. What the bag
     says of its run is kept. A whole bag is left as it is.
-
-    Args:
-        path: a rosbag2 directory, or one ``.mcap`` file.
-        packing: of files that are rewritten.
 
     Raises:
         InputError: no such bag, one of another kind, or a file that is no MCAP file at all.
@@ -79,13 +60,15 @@ def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noq
     contents = [_look(file) for file in files]
     notes = [note for content in contents for note in content.notes]
     ill = [content.damaged or not content.finished for content in contents]
-    caps = log_time_caps(files) if any(ill) else [None] * len(files)
+    caps = finish.log_time_caps(files) if any(ill) else [None] * len(files)
     for number, file in enumerate(files):
+        if contents[number].damaged:
+            shutil.copy2(file, file.with_suffix(".mcap.damaged"))
         if ill[number]:
-            contents[number] = _mend(file, contents[number], packing, caps[number])
+            contents[number] = finish.rewrite(file, packing, cap=caps[number], salvage=True)
     listing = _listing_faults(path, contents)
     if path.is_dir() and (any(ill) or listing):
-        write_listing(path, contents)
+        finish.write_listing(path, contents)
     status = RepairStatus.FINISHED if any(ill) or listing else RepairStatus.WHOLE
     if any(content.damaged for content in contents):
         status = RepairStatus.SALVAGED
@@ -98,7 +81,7 @@ def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noq
     )
 
 
-def _look(path: Path) -> FileContent:
+def _look(path: Path) -> finish.FileContent:
     """Return what a file holds, damaged or not."""
     scan = McapScan(path, salvage=True)
     first: int | None = None
@@ -110,17 +93,10 @@ def _look(path: Path) -> FileContent:
     counts: Counter[str] = Counter()
     for channel, topic in scan.topics.items():
         counts[topic.name] += scan.counts[channel]
-    return content_of(BagFile(path.name, dict(counts), first, last), scan)
+    return finish.content_of(BagFile(path.name, dict(counts), first, last), scan)
 
 
-def _mend(path: Path, content: FileContent, packing: Packing, cap: int | None) -> FileContent:
-    """Rewrite one file; a damaged one stays beside the new one under another name."""
-    if content.damaged:
-        shutil.copy2(path, path.with_suffix(".mcap.damaged"))
-    return rewrite(path, packing, cap=cap, salvage=True)
-
-
-def _listing_faults(path: Path, contents: list[FileContent]) -> list[str]:
+def _listing_faults(path: Path, contents: list[finish.FileContent]) -> list[str]:
     """Return what is wrong with ``metadata.yaml``; nothing for a single file."""
     if not path.is_dir():
         return []
@@ -132,7 +108,7 @@ def _listing_faults(path: Path, contents: list[FileContent]) -> list[str]:
         return [str(error)]
 
 
-def _counts(contents: list[FileContent]) -> Counter[str]:
+def _counts(contents: list[finish.FileContent]) -> Counter[str]:
     counts: Counter[str] = Counter()
     for content in contents:
         counts.update(content.file.counts)

@@ -1,8 +1,6 @@
-"""What a bag says of the run that it holds: configurations, loop model, seed, versions.
+"""What a bag says of the run that it holds, in MCAP metadata records named ``stiction_run``.
 
-The recorder keeps it in MCAP metadata records named ``stiction_run``, so that it survives
-splitting, cutting and conversion, where the first messages of a topic may be gone. While
-the bag grows each record tells what is new; a finished file has one with everything.
+So it survives splitting, cutting and conversion. While a bag grows each record tells what is new.
 """
 
 from __future__ import annotations
@@ -17,8 +15,7 @@ import yaml
 from stiction_ros.records.storage.files import storage_files
 from stiction_ros.records.storage.mcap_scan import McapScan
 
-RUN = "stiction_run"
-"""Name of the metadata records."""
+RUN = "stiction_run"  # name of the metadata records
 
 _LENGTH = struct.Struct("<I")
 _HEAD = 4  # bytes of the CDR encapsulation
@@ -30,9 +27,6 @@ def run_metadata(path: str | Path) -> dict[str, str]:
     Keys: ``config:/plant`` and so on with the text on ``~/config``; ``loop_model:/loop_model``
     with the last text there; ``seed`` and ``version`` as the configurations give them;
     ``recorder`` with the version that wrote the bag.
-
-    Raises:
-        InputError: no such bag, or damaged.
     """
     found: list[tuple[str, dict[str, str]]] = []
     for file in storage_files(path):
@@ -59,20 +53,15 @@ def may_tell(topic: str, type_name: str) -> bool:
 
 
 def news(topic: str, type_name: str, data: bytes) -> dict[str, str]:
-    """Return what a message tells of the run; empty for all but configurations and models.
-
-    Args:
-        topic: full name.
-        type_name: ``std_msgs/msg/String`` is looked at.
-        data: the serialised message (CDR).
-    """
+    """Return what a serialised message tells of the run, a configuration or model, else empty."""
     text = string_of(data) if may_tell(topic, type_name) else None
     if text is None:
         return {}
     node, _, name = topic.rpartition("/")
     if name == "loop_model":
         return {f"loop_model:{topic}": text}
-    return {f"config:{node}": text} | _short(text)
+    told = mapping_of(text)
+    return {f"config:{node}": text} | {k: str(told[k]) for k in ("seed", "version") if k in told}
 
 
 def custom_data(run: Mapping[str, str]) -> dict[str, str]:
@@ -98,9 +87,3 @@ def mapping_of(text: str) -> dict[str, Any]:
     except (yaml.YAMLError, ValueError, RecursionError):  # a date such as 2026-13-45, 1000 brackets
         return {}
     return document if isinstance(document, dict) else {}
-
-
-def _short(text: str) -> dict[str, str]:
-    """Return seed and version of a configuration."""
-    document = mapping_of(text)
-    return {key: str(document[key]) for key in ("seed", "version") if key in document}

@@ -7,8 +7,7 @@ from collections.abc import Callable, Sequence
 
 from stiction_ros.errors import InputError
 
-OWN = "own"
-"""Instead of an expression: the topics of the recorder's namespace and those of the graph."""
+OWN = "own"  # in place of an expression: topics of the recorder's namespace and of the graph
 
 GLOBAL = ("clock", "diagnostics", "parameter_events", "rosout")
 
@@ -23,9 +22,6 @@ def topic_choice(
         regex: of full names; :data:`OWN` for the loop of the namespace.
         exclude: of full names that are left out, also when ``names`` has them.
         namespace: of the recorder.
-
-    Raises:
-        InputError: no regular expression, or nothing is chosen at all.
     """
     if not names and not regex:
         raise InputError("no topic is chosen", where="recorder", fix="set topics or regex")

@@ -1,11 +1,6 @@
 """Writes a rosbag2 directory that survives the death of its writer.
 
-While it runs, ``<dir>_0.mcap`` is a journal: every message is one unchunked record, handed
-to the operating system before :meth:`BagWriter.write` returns, so that a killed process
-loses nothing that it had written. At the limits that :class:`Splitting` sets the next file,
-``<dir>_1.mcap``, begins. :meth:`BagWriter.close` lets :func:`finish_bag` rewrite the
-journals chunked, compressed and indexed and adds ``metadata.yaml``; the same function
-repairs the bag of a writer that was killed.
+While it runs, ``<dir>_0.mcap`` is a journal; :func:`finish_bag` makes a finished bag of it.
 """
 
 from __future__ import annotations
@@ -13,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from types import TracebackType
 
 from mcap.records import Channel, Message, Metadata, Schema
 
@@ -21,14 +15,8 @@ from stiction_ros import __version__
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.finish import ROSBAG2, Packing, finish_bag, storage_path
 from stiction_ros.records.bag.run_metadata import RUN, may_tell, news
-from stiction_ros.records.storage.bag_metadata import (
-    BagFile,
-    BagTopic,
-    Qos,
-    bag_information,
-    metadata_record,
-    qos_yaml,
-)
+from stiction_ros.records.storage import bag_metadata
+from stiction_ros.records.storage.bag_metadata import Qos
 from stiction_ros.records.storage.mcap_journal import Journal
 
 __all__ = ["BagWriter", "Packing", "Qos", "Splitting"]
@@ -36,15 +24,10 @@ __all__ = ["BagWriter", "Packing", "Qos", "Splitting"]
 
 @dataclasses.dataclass(frozen=True)
 class Splitting:
-    """When a bag goes on in its next file; 0 for never.
+    """When a bag goes on in its next file; 0 for never."""
 
-    Attributes:
-        size: bytes of messages in one file, before compression.
-        duration: log time in one file, ns.
-    """
-
-    size: int = 0
-    duration: int = 0
+    size: int = 0  # bytes of messages in one file, before compression
+    duration: int = 0  # log time in one file, ns
 
 
 class _Entry:
@@ -52,7 +35,7 @@ class _Entry:
 
     __slots__ = ("channel", "count", "tells", "topic")
 
-    def __init__(self, channel: int, topic: BagTopic) -> None:
+    def __init__(self, channel: int, topic: bag_metadata.BagTopic) -> None:
         self.channel = channel
         self.topic = topic
         self.count = 0
@@ -62,17 +45,10 @@ class _Entry:
 class BagWriter:
     """A rosbag2 bag (MCAP storage) being written; also a context manager.
 
-    Args:
-        directory: the bag; made with its parents, must not hold anything yet.
-        packing: of the finished bag.
-        splitting: when the next file begins.
-
-    What ``~/config`` and ``loop_model`` say is kept as metadata of the run too, see
-    :mod:`stiction_ros.records.bag.run_metadata`. One thread writes. Times are integers in
-    nanoseconds.
-
-    Raises:
-        InputError: the directory holds something already.
+    Every message is one unchunked record, handed to the operating system before :meth:`write`
+    returns. One thread writes. Times are integers in ns. What ``~/config`` and
+    ``loop_model`` say is kept as metadata of the run too. The directory is made with parents and
+    must not hold anything yet.
     """
 
     def __init__(
@@ -109,21 +85,16 @@ class BagWriter:
         type_hash: str,
         qos: Qos | Iterable[Qos] = Qos(),  # noqa: B008 (frozen)
     ) -> None:
-        """Announce a topic before its first message.
+        """Announce a topic, by full name and type such as ``sensor_msgs/msg/JointState``.
 
-        Args:
-            name: full topic name.
-            type: ``sensor_msgs/msg/JointState``.
-            definition_text: definition with dependencies, see :func:`definition`.
-            type_hash: ``RIHS01_…`` or empty.
-            qos: what its publishers offer, one profile or one for each.
-
-        Raises:
-            InputError: the topic is there already with another type.
+        Its definition has its dependencies with it, and a hash or none, as :func:`definition`
+        gives them; ``qos`` is one profile of its publishers or one for each.
         """
         self._open()
         profiles = (qos,) if isinstance(qos, Qos) else tuple(qos)
-        topic = BagTopic(name, type, definition_text, type_hash, qos_yaml(profiles))
+        topic = bag_metadata.BagTopic(
+            name, type, definition_text, type_hash, bag_metadata.qos_yaml(profiles)
+        )
         if name in self._entries:
             known = self._entries[name].topic
             if known.type == type:
@@ -137,17 +108,10 @@ class BagWriter:
         self._entries[name] = entry
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
-        """Write one serialised message (CDR); it is safe from a kill when this returns.
+        """Write one serialised message (CDR) of a topic; it is safe from a kill when this returns.
 
-        Args:
-            topic: a name given to :meth:`add_topic`.
-            data: the bytes of a raw subscription.
-            log_time: when it was received, ns; simulated time when there is a clock.
-            publish_time: when it was sent, ns.
-
-        Raises:
-            InputError: a topic that was not announced.
-            OSError: the storage refuses, a full disk for example.
+        Log time, when it was received, is simulated when there is a clock; ``publish_time`` is when
+        it was sent, ns. Where the storage refuses, as a full disk does, it is an OSError.
         """
         try:
             entry = self._entries[topic]
@@ -167,15 +131,9 @@ class BagWriter:
         self._journal.put(Metadata(metadata=dict(mapping), name=name))
 
     def put_back(self) -> str:
-        """Write again what somebody has removed while it was being recorded.
+        """Write again what somebody has removed meanwhile; return a sentence, empty for none.
 
         Of the present file nothing is lost; files that were complete cannot be written again.
-
-        Returns:
-            What was found and done, one sentence; empty when everything is there.
-
-        Raises:
-            OSError: the storage refuses, or another file stands in the way.
         """
         if self._journal.is_there:
             return ""
@@ -191,11 +149,7 @@ class BagWriter:
         return f"{said}; {len(gone)} files before it are lost" if gone else said
 
     def close(self) -> None:
-        """Finish the bag; a second call does nothing.
-
-        Raises:
-            OSError: the storage refuses; the journals stay, and can be read.
-        """
+        """Finish the bag; a second call does nothing. If the storage refuses the journals stay."""
         if self._closed:
             return
         self.put_back()
@@ -206,12 +160,7 @@ class BagWriter:
     def __enter__(self) -> BagWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _open(self) -> None:
@@ -245,8 +194,8 @@ class BagWriter:
         self._journal = Journal(path)
         self._first = None
         self._schemas = {}
-        start = bag_information([BagFile(path.name, {}, None, None)], [])
-        self._journal.put(Metadata(metadata=metadata_record(start), name=ROSBAG2))
+        start = bag_metadata.bag_information([bag_metadata.BagFile(path.name, {}, None, None)], [])
+        self._journal.put(Metadata(metadata=bag_metadata.metadata_record(start), name=ROSBAG2))
         self._journal.put(Metadata(metadata=self._run, name=RUN))
         for entry in self._entries.values():
             self._announce(entry)

@@ -16,11 +16,8 @@ def read_bag_parts(path: str | Path, *, namespace: str | None = None) -> tuple[R
     """Read the records of a loop from a bag, one for each stretch without a gap.
 
     Bad messages are left out; short holes are held, which the mask says; runs are told apart
-    where stamps fall back. The notes of each record say what was done.
-
-    Args:
-        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
-        namespace: of the loop's topics; needed when the bag holds several loops.
+    where stamps fall back. The notes of each record say what was done. The ``namespace`` is that of
+    the loop's topics, needed when the bag holds several loops.
 
     Raises:
         InputError: as :func:`read_messages`; no ``pv`` or ``op``; stamps that are irregular.
@@ -29,12 +26,7 @@ def read_bag_parts(path: str | Path, *, namespace: str | None = None) -> tuple[R
 
 
 def read_bag_loops(path: str | Path) -> dict[str, tuple[Record, ...] | InputError]:
-    """Read the records of every loop in a bag, as :func:`read_bag_parts`.
-
-    Returns:
-        Namespace of each loop, such as ``/unit1``, to its records, or to the reason why there are
-        none.
-    """
+    """Return the records of every loop by its namespace, as ``/unit1``, or why there are none."""
     signals, notes = _signals(path)
     found: dict[str, tuple[Record, ...] | InputError] = {}
     for space in signals.loops or ("",):

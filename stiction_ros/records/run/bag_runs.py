@@ -1,9 +1,7 @@
 """Tells the runs in a bag apart: a plant that was restarted begins its stamps anew.
 
-Around a restart messages of both runs may stand in the bag in any order, so the stamps are
-followed as *chains*: each message continues the chain whose next stamp it bears. A chain that
-begins, in stamps and in the log, behind the end of another goes on with it after a gap; one
-whose stamps fall back is another run.
+Stamps are followed as *chains*: messages of both runs may stand in any order. A chain that begins
+behind the end of another goes on with it after a gap; one whose stamps fall back is another run.
 """
 
 from __future__ import annotations
@@ -15,39 +13,22 @@ import numpy as np
 
 from stiction_ros.records.regular import GAP
 
-NEW_RUN = 10
-"""Messages that make a run beside another; fewer are out of order."""
-
-LATE = 3
-"""Messages out of order that may have come late, and are put where they are missing."""
-
-AGAIN = 0.75
-"""How far off, in usual steps, a message counts that shows the present sample again."""
-
-STALE = 0.1
-"""How much further off a chain counts for each message that did not continue it."""
-
-FORGOTTEN = 25
-"""Messages after which a chain that none of them continued is over."""
-
-NEAR = 30
-"""Messages of all signals between a sample and another signal's message for it, at most."""
+NEW_RUN = 10  # messages that make a run beside another; fewer are out of order
+LATE = 3  # messages out of order that may have come late, and are put where they are missing
+AGAIN = 0.75  # how far off, in usual steps, a message counts that shows the present sample again
+STALE = 0.1  # how much further off a chain counts for each message that did not continue it
+FORGOTTEN = 25  # messages after which a chain that none of them continued is over
+NEAR = 30  # messages of all signals between a sample and another signal's message for it, at most
 
 
 @dataclasses.dataclass
 class Run:
-    """Messages of one run.
+    """Messages of one run."""
 
-    Attributes:
-        place: stamp in ns to the message's number in the log; the first one of each stamp.
-        begin, end: numbers of its first and last message in the log.
-        first, last: smallest and largest stamp, ns.
-    """
-
-    place: dict[int, int]
-    begin: int
+    place: dict[int, int]  # stamp in ns to number in the log of the first message of that stamp
+    begin: int  # begin, end: numbers of its first and last message in the log
     end: int
-    first: int
+    first: int  # first, last: smallest and largest stamp, ns
     last: int
 
     @classmethod
@@ -68,26 +49,15 @@ class Run:
 
 @dataclasses.dataclass(frozen=True)
 class Told:
-    """What the stamps of a signal tell.
+    """What the stamps of a signal tell."""
 
-    Attributes:
-        runs: in the order in which they begin.
-        strays: stretches too short for a run, in the same order.
-        lost: messages in no run.
-    """
-
-    runs: tuple[Run, ...]
-    strays: tuple[Run, ...]
-    lost: int
+    runs: tuple[Run, ...]  # in the order in which they begin
+    strays: tuple[Run, ...]  # stretches too short for a run, in the same order
+    lost: int  # messages in no run
 
 
 def tell_runs(stamps: Sequence[int], numbers: Sequence[int]) -> Told:
-    """Tell the runs apart.
-
-    Args:
-        stamps: of one signal in the order of the log, ns.
-        numbers: of these messages in the log, increasing.
-    """
+    """Tell apart the runs of one signal by its stamps, ns, and numbers in the order of the log."""
     pieces = _connected(_chains(stamps, numbers))
     if not pieces:
         return Told((), (), 0)
@@ -107,15 +77,10 @@ def tell_runs(stamps: Sequence[int], numbers: Sequence[int]) -> Told:
 
 
 def run_of(runs: Sequence[Run], stamp: int, number: int) -> Run:
-    """Return the run to which a message of another signal belongs.
+    """Return which of ``runs``, one at least, a message of another signal belongs to.
 
-    It is the one that has its stamp nearest in the log, unless that is far away, as when the
-    sample itself was lost: then it is the run that had begun last.
-
-    Args:
-        runs: one at least.
-        stamp: of the message, ns.
-        number: its place in the log.
+    It is the one that has its stamp, in ns, nearest to its number in the log, unless that is far
+    away, as when the sample itself was lost: then it is the run that had begun last.
     """
     active = next((run for run in reversed(runs) if run.begin <= number), runs[0])
     known = [run for run in runs if stamp in run.place]
@@ -153,10 +118,7 @@ def _chains(stamps: Sequence[int], numbers: Sequence[int]) -> list[Run]:
 
 
 def _usual_step(stamps: Sequence[int]) -> float:
-    """Return the usual step from one message of a run to the next, ns.
-
-    Where two runs alternate the next message is the next but one.
-    """
+    """Return the usual step from one message of a run to the next, ns."""
     found = []
     for lag in (1, 2):
         given = np.asarray(stamps, dtype=np.int64)
@@ -168,10 +130,7 @@ def _usual_step(stamps: Sequence[int]) -> float:
 
 
 def _connected(chains: Sequence[Run]) -> list[Run]:
-    """Join chains of which one begins where another has ended, in stamps and in the log.
-
-    A run does not go on when another one has begun after its end.
-    """
+    """Join chains of which one begins where another has ended, in stamps and in the log."""
     runs: list[Run] = []
     for chain in chains:
         newest = max((run.begin for run in runs if len(run.place) >= NEW_RUN), default=0)

@@ -28,55 +28,33 @@ FIGURES = ("p50", "p99", "p999", "max")
 
 @dataclasses.dataclass(frozen=True)
 class Estimate:
-    """One parameter of one fit.
+    """One parameter of one fit."""
 
-    Attributes:
-        stamp: end of the window, ns.
-        name: ``V1.f_s``.
-        value: estimate, % of travel for friction.
-        low: lower end of its interval, NaN when not given.
-        high: upper end of its interval, NaN when not given.
-    """
-
-    stamp: int
-    name: str
-    value: float
-    low: float
-    high: float
+    stamp: int  # end of the window, ns
+    name: str  # ``V1.f_s``
+    value: float  # estimate, % of travel for friction
+    low: float  # lower end of its interval, NaN when not given
+    high: float  # upper end of its interval, NaN when not given
 
 
 @dataclasses.dataclass(frozen=True)
 class ModeChange:
-    """The controller's mode from a moment on.
+    """The controller's mode from a moment on."""
 
-    Attributes:
-        stamp: of the first ``op`` of the new mode, ns.
-        mode: ``unaware``, ``embedding``, ``inversion`` or ``hold``.
-        model: of the valves that it works with, as the controller names it.
-        reason: why it changed.
-        frictions: what it takes for the friction of its valves, by ``V1.f_s``, %.
-    """
-
-    stamp: int
-    mode: str
-    model: str = ""
-    reason: str = ""
-    frictions: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    stamp: int  # of the first ``op`` of the new mode, ns
+    mode: str  # ``unaware``, ``embedding``, ``inversion`` or ``hold``
+    model: str = ""  # of the valves that it works with, as the controller names it
+    reason: str = ""  # why it changed
+    frictions: Mapping[str, float] = dataclasses.field(default_factory=dict)  # by ``V1.f_s``, %
 
 
 @dataclasses.dataclass(frozen=True)
 class Fit:
-    """One fit of the estimator.
+    """One fit of the estimator."""
 
-    Attributes:
-        stamp: end of the window, ns.
-        identification: the mapping of ``identify --json`` without ``record``.
-        trusted: friction trusted after this fit, by ``V1.f_s``, %.
-    """
-
-    stamp: int
-    identification: Mapping[str, Any]
-    trusted: Mapping[str, float]
+    stamp: int  # end of the window, ns
+    identification: Mapping[str, Any]  # the mapping of ``identify --json`` without ``record``
+    trusted: Mapping[str, float]  # friction trusted after this fit, by ``V1.f_s``, %
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,15 +68,10 @@ class Text:
 
 @dataclasses.dataclass(frozen=True)
 class GapLog:
-    """What the monitor told, by the end of its window in ns.
+    """What the monitor told, by the end of its window in ns."""
 
-    Attributes:
-        looks: documents of the measurements.
-        findings: documents of what the workflow found.
-    """
-
-    looks: Mapping[int, Mapping[str, Any]]
-    findings: Mapping[int, Mapping[str, Any]]
+    looks: Mapping[int, Mapping[str, Any]]  # documents of the measurements
+    findings: Mapping[int, Mapping[str, Any]]  # documents of what the workflow found
 
 
 class _Status(NamedTuple):
@@ -112,8 +85,7 @@ class _Status(NamedTuple):
 def of_loop(messages: Iterable[BagMessage], space: str) -> list[BagMessage]:
     """Return the messages of the loop in the namespace ``space``, and what is global.
 
-    The diagnostics of all loops share a topic; of these the statuses of the loop's nodes
-    are kept, which begin with its namespace.
+    Of the diagnostics, a topic that loops share, the statuses of the loop's own nodes are kept.
     """
     kept = []
     for message in messages:
@@ -142,23 +114,37 @@ def estimates(messages: Iterable[BagMessage]) -> tuple[Estimate, ...]:
         state = message.message
         stamp = stamp_ns(state)
         for index, (name, value) in enumerate(zip(state.name, state.position, strict=False)):
-            low = _item(state.velocity, index)
-            high = _item(state.effort, index)
+            low, high = (
+                float(ends[index]) if index < len(ends) else math.nan
+                for ends in (state.velocity, state.effort)
+            )
             found.append(Estimate(stamp, str(name), float(value), low, high))
     return tuple(found)
 
 
 def mode_changes(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
     """Return the changes of mode, model or friction in ``/diagnostics``, with swap times."""
-    changes: list[ModeChange] = []
-    for stamp, _, values in _statuses(messages):
-        if "mode" not in values:
-            continue
-        model, reason = values.get("model", ""), values.get("reason", "")
-        change = ModeChange(stamp, values["mode"], model, reason, _frictions(values, "."))
-        if not changes or _force(changes[-1]) != _force(change):
-            changes.append(change)
-    return tuple(changes)
+    return without_repeats(
+        ModeChange(
+            stamp,
+            values["mode"],
+            values.get("model", ""),
+            values.get("reason", ""),
+            _frictions(values, "."),
+        )
+        for stamp, _, values in _statuses(messages)
+        if "mode" in values
+    )
+
+
+def without_repeats(changes: Iterable[ModeChange]) -> tuple[ModeChange, ...]:
+    """Drop changes that change neither mode nor model nor friction."""
+    kept: list[ModeChange] = []
+    for change in changes:
+        force = (change.mode, change.model, change.frictions)
+        if not kept or force != (kept[-1].mode, kept[-1].model, kept[-1].frictions):
+            kept.append(change)
+    return tuple(kept)
 
 
 def fits(messages: Iterable[BagMessage]) -> tuple[Fit, ...]:
@@ -180,25 +166,20 @@ def gap_log(messages: Iterable[BagMessage]) -> GapLog:
 
 
 def answer_times(messages: Iterable[BagMessage]) -> dict[str, float]:
-    """Return p50, p99, p999 and max of the times from PV to OP, ms; empty in lockstep.
-
-    The figures are of the whole run, so the last ones told count.
-    """
+    """Return the last p50, p99, p999 and max of the times from PV to OP, ms; empty in lockstep."""
     found: dict[str, float] = {}
     for _, _, told in _statuses(messages):
-        values = {name: _number(told.get(f"pv_to_op_ms_{name}", "")) for name in FIGURES}
-        if all(map(math.isfinite, values.values())):
-            found = values
+        with contextlib.suppress(KeyError, ValueError):
+            values = {name: float(told[f"pv_to_op_ms_{name}"]) for name in FIGURES}
+            found = values if all(map(math.isfinite, values.values())) else found
     return found
 
 
 def stem_estimate(messages: Iterable[BagMessage], record: Record, start: int) -> FloatArray | None:
     """Return the stem positions, shape (N, m), in the first points on ``prediction``.
 
-    Args:
-        messages: of the run.
-        record: without gaps; NaN stands where a sample has no prediction.
-        start: stamp of its first sample, ns.
+    The ``record`` has no gaps and begins at stamp ``start``, ns; NaN stands where a sample has no
+    prediction.
     """
     found = np.full((len(record), len(record.valves)), np.nan)
     told = False
@@ -214,15 +195,8 @@ def stem_estimate(messages: Iterable[BagMessage], record: Record, start: int) ->
     return found if told else None
 
 
-def _force(change: ModeChange) -> tuple[object, ...]:
-    return change.mode, change.model, change.frictions
-
-
 def _frictions(values: Mapping[str, str], mark: str) -> dict[str, float]:
-    """Return ``V1.f_s`` → value from keys such as ``V1.f_s`` or ``V1.trusted_f_s``.
-
-    What a law has for further parameters is among them; its name is no number and is not.
-    """
+    """Return ``V1.f_s`` → value from keys such as ``V1.f_s`` or ``V1.trusted_f_s``."""
     found = {}
     for key, value in values.items():
         valve, dot, name = key.rpartition(mark)
@@ -231,6 +205,15 @@ def _frictions(values: Mapping[str, str], mark: str) -> dict[str, float]:
         with contextlib.suppress(ValueError):
             found[f"{valve}.{name}"] = float(value)
     return found
+
+
+def swap_of(changes: Iterable[ModeChange], before: str = "") -> ModeChange | None:
+    """Return the first change from ``unaware`` to a mode that knows of the friction."""
+    for change in changes:
+        if before == "unaware" and change.mode in ("embedding", "inversion"):
+            return change
+        before = change.mode
+    return None
 
 
 def mode_texts(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
@@ -311,18 +294,5 @@ def _documents(
             yield int(end), values, document
 
 
-def _number(text: str) -> float:
-    """Return the number in a text; NaN for none."""
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
-
-
 def _of(messages: Iterable[BagMessage], type_name: str, name: str) -> Iterable[BagMessage]:
     return (m for m in messages if m.type == type_name and last_part(m.topic)[1] == name)
-
-
-def _item(values: Iterable[float], index: int) -> float:
-    items = list(values)
-    return float(items[index]) if index < len(items) else float("nan")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,67 +13,33 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records.bag.messages import BagMessage, MessageDecoder, read_raw
 from stiction_ros.records.parts import joined, span
 from stiction_ros.records.record import Record
+from stiction_ros.records.run import events
 from stiction_ros.records.run.bag_reader import bag_source
-from stiction_ros.records.run.events import (
-    Estimate,
-    Fit,
-    GapLog,
-    ModeChange,
-    Text,
-    answer_times,
-    clock,
-    estimates,
-    fits,
-    gap_log,
-    mode_changes,
-    mode_texts,
-    of_loop,
-    published_counts,
-    stem_estimate,
-    tells_of_run,
-    texts,
-)
 from stiction_ros.records.run.loop_runs import LoopRun, loop_runs
 from stiction_ros.records.run.loop_signals import LoopSignals, is_signal
 
 
 @dataclasses.dataclass(frozen=True)
 class RunLog:
-    """A run of the live loop as its bag tells it.
+    """A run of the live loop as its bag tells it."""
 
-    Attributes:
-        record: the loop's signals, one segment; where some are missing stand bad samples.
-        start: stamp of the record's first sample, ns.
-        estimates: in the order they came.
-        modes: every change of mode, model or friction, the mode at the start first.
-        loop_models: the YAML texts on ``loop_model``.
-        configs: what the nodes published on ``~/config``.
-        clock: the simulated times on ``/clock``, ns.
-        recorded: messages in the bag by topic.
-        published: messages by topic as the nodes counted them in ``/diagnostics``.
-        notes: what was left out while reading, one sentence each.
-        fits: in the order of their windows.
-        stem_estimate: the controller's estimate of the stem positions at the record's
-            samples, shape (N, m), %, NaN where none was published; None when there is none.
-        gaps: what the monitor told.
-        pv_to_op_ms: p50, p99, p999 and max of the times from PV to OP; empty in lockstep.
-        wall_seconds: from the first to the last publication, on the publishers' clock.
-    """
-
-    record: Record
-    start: int
-    estimates: tuple[Estimate, ...]
-    modes: tuple[ModeChange, ...]
-    loop_models: tuple[Text, ...]
-    configs: tuple[Text, ...]
-    clock: tuple[int, ...]
-    recorded: Mapping[str, int]
-    published: Mapping[str, int]
-    notes: tuple[str, ...] = ()
-    fits: tuple[Fit, ...] = ()
+    record: Record  # the loop's signals, one segment; where some are missing stand bad samples
+    start: int  # stamp of the record's first sample, ns
+    estimates: tuple[events.Estimate, ...]  # in the order they came
+    modes: tuple[events.ModeChange, ...]  # changes of mode, model or friction, the first mode first
+    loop_models: tuple[events.Text, ...]  # the YAML texts on ``loop_model``
+    configs: tuple[events.Text, ...]  # what the nodes published on ``~/config``
+    clock: tuple[int, ...]  # the simulated times on ``/clock``, ns
+    recorded: Mapping[str, int]  # messages in the bag by topic
+    published: Mapping[str, int]  # messages by topic as the nodes counted them in ``/diagnostics``
+    notes: tuple[str, ...] = ()  # what was left out while reading, one sentence each
+    fits: tuple[events.Fit, ...] = ()  # in the order of their windows
+    # the controller's estimate of the stem positions at the record's samples, shape (N, m), %, NaN
+    # where none was published; None when there is none
     stem_estimate: FloatArray | None = None
-    wall_seconds: float = float("nan")
-    gaps: GapLog = GapLog({}, {})
+    wall_seconds: float = float("nan")  # from first to last publication, on the publishers' clock
+    gaps: events.GapLog = events.GapLog({}, {})  # what the monitor told
+    # p50, p99, p999 and max of the times from PV to OP; empty in lockstep
     pv_to_op_ms: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def seconds(self, stamp: int) -> float:
@@ -80,20 +47,13 @@ class RunLog:
         return (stamp - self.start) / 1e9
 
     @property
-    def swap(self) -> ModeChange | None:
+    def swap(self) -> events.ModeChange | None:
         """The first change from ``unaware`` to a mode that knows of the friction.
 
         A change whose first sample is not in the record, as it was cut there, is none.
         """
-        before = ""
         end = self.start + round(len(self.record) * self.record.sample_time * 1e9)
-        for change in self.modes:
-            if change.stamp >= end:
-                break
-            if before == "unaware" and change.mode in ("embedding", "inversion"):
-                return change
-            before = change.mode
-        return None
+        return events.swap_of(itertools.takewhile(lambda change: change.stamp < end, self.modes))
 
     @property
     def swap_sample(self) -> int | None:
@@ -103,7 +63,7 @@ class RunLog:
         return round(self.seconds(self.swap.stamp) / self.record.sample_time)
 
     @property
-    def fit_at_swap(self) -> Fit | None:
+    def fit_at_swap(self) -> events.Fit | None:
         """The last fit whose window ended before the swap."""
         if self.swap is None:
             return None
@@ -130,7 +90,7 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
         recorded[raw.topic.name] += 1
         sent.append(raw.publish_time)
         signal = is_signal(raw.topic)
-        if not signal and not tells_of_run(raw.topic):
+        if not signal and not events.tells_of_run(raw.topic):
             continue
         message = decoder.decode(raw, str(path))
         if message is None:
@@ -140,53 +100,43 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
         else:
             messages.append((number, message))
     notes.extend(decoder.notes)
-    published = published_counts([message for _, message in messages])
+    published = events.published_counts([message for _, message in messages])
     runs = loop_runs(signals, bag_source(path), namespace, notes)
     run = max(runs, key=len)
-    said = _said(messages, runs, run)
+    place = runs.index(run)  # what was said between the begin of the run and that of the next one
+    begin = run.begin if place else 0
+    end = runs[place + 1].begin if place + 1 < len(runs) else math.inf
+    said = [message for number, message in messages if begin <= number < end]
     configured = [message for number, message in messages if number <= run.end or run is runs[-1]]
     if len(signals.loops) > 1:
         space = signals.loop(namespace)
-        said, configured = of_loop(said, space), of_loop(configured, space)
+        said, configured = events.of_loop(said, space), events.of_loop(configured, space)
     record = _record(run, runs)
     start = run.start + round((record.start - run.parts[0].start) * 1e9)
-    configs = texts(configured, "config")
+    configs = events.texts(configured, "config")
     if run is not runs[0]:  # what a node said when it was started again holds
         configs = tuple({text.topic: text for text in configs}.values())
     return RunLog(
         record=record,
         start=start,
-        estimates=estimates(said),
-        modes=mode_changes(said) or mode_texts(said),
-        loop_models=texts(configured, "loop_model"),
+        estimates=events.estimates(said),
+        modes=events.mode_changes(said) or events.mode_texts(said),
+        loop_models=events.texts(configured, "loop_model"),
         configs=configs,
-        clock=clock(said),
+        clock=events.clock(said),
         recorded=dict(recorded),
         published=published,
         notes=record.notes,
-        fits=fits(said),
-        stem_estimate=stem_estimate(said, record, start),
+        fits=events.fits(said),
+        stem_estimate=events.stem_estimate(said, record, start),
         wall_seconds=(max(sent) - min(sent)) / 1e9,
-        gaps=gap_log(said),
-        pv_to_op_ms=answer_times(said),
+        gaps=events.gap_log(said),
+        pv_to_op_ms=events.answer_times(said),
     )
 
 
-def _said(
-    messages: Sequence[tuple[int, BagMessage]], runs: Sequence[LoopRun], run: LoopRun
-) -> list[BagMessage]:
-    """Return what was said between the beginning of a run and that of the next one."""
-    place = runs.index(run)
-    begin = run.begin if place else 0
-    end = runs[place + 1].begin if place + 1 < len(runs) else None
-    return [m for number, m in messages if begin <= number and (end is None or number < end)]
-
-
 def _record(run: LoopRun, runs: Sequence[LoopRun]) -> Record:
-    """Return the record of a run on one regular grid, its notes telling of gaps and other runs.
-
-    Only the longest stretch is taken of a run with a gap that is longer than all its samples.
-    """
+    """Return the record of a run on one regular grid, its notes telling of gaps and other runs."""
     total = sum(len(part) for part in run.parts)
     stretches: list[list[Record]] = [[run.parts[0]]]
     for before, after in itertools.pairwise(run.parts):

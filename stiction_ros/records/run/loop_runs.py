@@ -16,26 +16,18 @@ from stiction_ros.records.run.bag_runs import run_of, tell_runs
 from stiction_ros.records.run.loop_signals import Given, LoopSignals
 from stiction_ros.records.whole import Source, Whole
 
-Samples = dict[int, dict[str, float]]
-"""Stamp in ns to tag to value."""
-
+Samples = dict[int, dict[str, float]]  # stamp in ns to tag to value
 MOST_HELD = 0.01  # share of the samples at which a missing stem is held
 
 
 @dataclasses.dataclass(frozen=True)
 class LoopRun:
-    """One run of a loop.
+    """One run of a loop."""
 
-    Attributes:
-        begin, end: numbers of its first and last message of ``pv`` in the log.
-        start: stamp of its first sample, ns.
-        parts: its records without a gap, in order of time.
-    """
-
-    begin: int
+    begin: int  # begin, end: numbers of its first and last message of ``pv`` in the log
     end: int
-    start: int
-    parts: tuple[Record, ...]
+    start: int  # stamp of its first sample, ns
+    parts: tuple[Record, ...]  # its records without a gap, in order of time
 
     def __len__(self) -> int:
         return sum(len(part) for part in self.parts)
@@ -44,21 +36,12 @@ class LoopRun:
 def loop_runs(
     signals: LoopSignals, source: Source, namespace: str | None, notes: Sequence[str]
 ) -> tuple[LoopRun, ...]:
-    """Join what was collected of a loop.
+    """Join what was collected of a loop to its runs, at least one, in the order of their begin.
 
     A stamp counts when ``pv`` and ``op`` both have it; where ``op_applied`` tells what the
     valves were given, that is taken for ``op``, and alone it will do, as where nobody but the
     plant's own controller gives an OP. ``sp`` is held from one message to the next;
     ``stem`` is dropped with a note when a stamp lacks it.
-
-    Args:
-        signals: of the bag.
-        source: of the records, the bag.
-        namespace: of the loop; None when there is only one.
-        notes: to put before those of every record.
-
-    Returns:
-        One run at least, in the order in which they begin.
 
     Raises:
         InputError: no such loop; no usable message of ``pv`` or ``op``; in no run are two
@@ -88,8 +71,7 @@ def loop_runs(
         note = f"{len(refused)} runs left out: {refused[0].what}"
         found = [
             dataclasses.replace(
-                run,
-                parts=tuple(dataclasses.replace(p, notes=(*p.notes, note)) for p in run.parts),
+                run, parts=tuple(dataclasses.replace(p, notes=(*p.notes, note)) for p in run.parts)
             )
             for run in found
         ]
@@ -135,11 +117,7 @@ class _Loop:
         self._sp_lacks = bool(not self._sp and signals.tags(space, "sp"))
 
     def run(self, number: int, notes: Sequence[str]) -> LoopRun:
-        """Return one run.
-
-        Raises:
-            InputError: fewer than two samples, or none that are regular.
-        """
+        """Return one run; InputError for fewer than two samples, or none that are regular."""
         run, said = self.runs[number], list(notes)
         pv = {stamp: self._pv[place] for stamp, place in run.place.items()}
         op = self._op(number, pv, said)
@@ -162,11 +140,7 @@ class _Loop:
         return LoopRun(run.begin, run.end, begin, moved)
 
     def _by_run(self, given: Sequence[Given]) -> list[Samples]:
-        """Return the messages of a signal for each run.
-
-        Of several that bear one stamp the one counts that is nearest to its PV in the log, or
-        the last one where there is no PV.
-        """
+        """Return the messages of a signal for each run."""
         found: list[Samples] = [{} for _ in self.runs]
         off: list[dict[int, int]] = [{} for _ in self.runs]
         places = {id(run): number for number, run in enumerate(self.runs)}
@@ -244,13 +218,7 @@ def _at(stamps: np.ndarray[Any, Any], samples: Samples, tags: tuple[str, ...]) -
 
 
 def _with_known(record: Record, first: int, pv: Samples, op: Samples) -> Record:
-    """Return the record with the one of PV and OP that is known at a sample that lacks the other.
-
-    Args:
-        record: its start counts from ``first``.
-        first: stamp of the run's first sample, ns.
-        pv, op: by stamp.
-    """
+    """Return the record with what is known, by stamp, of samples that lack PV or OP."""
     held = np.flatnonzero(record.quality == Quality.HELD).tolist()
     if not held:
         return record

@@ -15,17 +15,11 @@ SIGNALS = ("pv", "sp", "op", "op_applied", "stem")
 
 
 class Given(NamedTuple):
-    """One usable message of a signal.
+    """One usable message of a signal."""
 
-    Attributes:
-        number: its place in the log.
-        stamp: ns.
-        values: tag to value.
-    """
-
-    number: int
-    stamp: int
-    values: dict[str, float]
+    number: int  # its place in the log
+    stamp: int  # ns
+    values: dict[str, float]  # tag to value
 
 
 def is_signal(topic: BagTopic) -> bool:
@@ -34,11 +28,7 @@ def is_signal(topic: BagTopic) -> bool:
 
 
 class LoopSignals:
-    """The signals of every loop in a bag, in the order of the log.
-
-    Args:
-        where: the bag, for errors.
-    """
+    """The signals of every loop in a bag, in the order of the log."""
 
     def __init__(self, where: str) -> None:
         self._where = where
@@ -47,15 +37,7 @@ class LoopSignals:
         self._bad: dict[tuple[str, str], Counter[str]] = {}
 
     def add(self, message: BagMessage, number: int) -> None:
-        """Take one message of a signal; what is wrong with it is counted.
-
-        Args:
-            message: of a topic that :func:`is_signal`.
-            number: its place in the log.
-
-        Raises:
-            InputError: the definition in the bag is not that of the type.
-        """
+        """Take one message of a topic that :func:`is_signal`; what is wrong with it is counted."""
         key = last_part(message.topic)
         try:
             names, values = message.message.name, message.message.position
@@ -110,12 +92,9 @@ class LoopSignals:
         return "op" if (space, "op") in self._given else "op_applied"
 
     def loop(self, namespace: str | None) -> str:
-        """Return the namespace of the loop that is meant.
+        """Return the namespace of the loop that is meant; InputError for none or an open choice.
 
         Where none is chosen a loop with an ``op`` comes before those that were only listened to.
-
-        Raises:
-            InputError: there is no such loop, or there are several and none was chosen.
         """
         loops = list(self.loops)
         if namespace is not None:

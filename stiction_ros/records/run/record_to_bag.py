@@ -76,12 +76,7 @@ def write_bag(record: Record, directory: str | Path) -> dict[str, int]:
 
 
 def joint_state_bytes(stamp: int, names: Sequence[str], position: Sequence[float]) -> bytes:
-    """Return a ``sensor_msgs/msg/JointState`` as CDR, little endian.
-
-    Args:
-        stamp: ns.
-        names, position: tags and their values.
-    """
+    """Return a ``sensor_msgs/msg/JointState`` as CDR, little endian; the stamp is in ns."""
     seconds, rest = divmod(stamp, SECOND)
     body = bytearray(struct.pack("<iI", seconds, rest))
     _put_text(body, "")

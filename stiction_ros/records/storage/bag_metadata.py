@@ -11,11 +11,8 @@ import yaml
 
 from stiction_ros.errors import InputError
 
-VERSION = 9
-"""Version of ``metadata.yaml``: QoS is a list of mappings with enums as words."""
-
-INFINITE_NS = 2**63 - 1
-"""Nanoseconds by which ROS writes an infinite duration."""
+VERSION = 9  # version of ``metadata.yaml``: QoS is a list of mappings with enums as words
+INFINITE_NS = 2**63 - 1  # nanoseconds by which ROS writes an infinite duration
 
 _WORDS = {
     "history": ("system_default", "keep_last", "keep_all", "unknown"),
@@ -27,32 +24,17 @@ _WORDS = {
 
 @dataclasses.dataclass(frozen=True)
 class Qos:
-    """Quality of service that a publisher offers.
+    """Quality of service that a publisher offers; a word that ROS does not know is refused."""
 
-    Attributes:
-        history: ``keep_last``, ``keep_all``, ``system_default`` or ``unknown``.
-        depth: messages kept when history is ``keep_last``.
-        reliability: ``reliable``, ``best_effort``, …
-        durability: ``volatile``, ``transient_local``, …
-        deadline: longest time between two messages, ns.
-        lifespan: time a message stays valid, ns.
-        liveliness: ``automatic``, ``manual_by_topic``, …
-        liveliness_lease_duration: ns.
-        avoid_ros_namespace_conventions: as in ROS.
-
-    Raises:
-        InputError: a word that ROS does not know.
-    """
-
-    history: str = "keep_last"
-    depth: int = 10
-    reliability: str = "reliable"
-    durability: str = "volatile"
-    deadline: int = INFINITE_NS
-    lifespan: int = INFINITE_NS
-    liveliness: str = "automatic"
-    liveliness_lease_duration: int = INFINITE_NS
-    avoid_ros_namespace_conventions: bool = False
+    history: str = "keep_last"  # ``keep_last``, ``keep_all``, ``system_default`` or ``unknown``
+    depth: int = 10  # messages kept when history is ``keep_last``
+    reliability: str = "reliable"  # ``reliable``, ``best_effort``, …
+    durability: str = "volatile"  # ``volatile``, ``transient_local``, …
+    deadline: int = INFINITE_NS  # longest time between two messages, ns
+    lifespan: int = INFINITE_NS  # time a message stays valid, ns
+    liveliness: str = "automatic"  # ``automatic``, ``manual_by_topic``, …
+    liveliness_lease_duration: int = INFINITE_NS  # ns
+    avoid_ros_namespace_conventions: bool = False  # as in ROS
 
     def __post_init__(self) -> None:
         for key, words in _WORDS.items():
@@ -73,31 +55,20 @@ class Qos:
         return values
 
 
-LATCHED = Qos(depth=1, durability="transient_local")
-"""QoS of topics whose last message late joiners get."""
+LATCHED = Qos(depth=1, durability="transient_local")  # late joiners get the last message
 
 
 @dataclasses.dataclass(frozen=True)
 class BagTopic:
-    """One topic of a bag.
+    """One topic of a bag."""
 
-    Attributes:
-        name: full topic name.
-        type: ``sensor_msgs/msg/JointState``.
-        definition: the message definition with its dependencies, ``ros2msg``.
-        type_hash: ``RIHS01_…``, empty when not known.
-        qos_yaml: the offered profiles, the YAML that the channel carries.
-        encoding: of the messages; ROS 2 writes ``cdr``.
-        schema_encoding: ``ros2msg``; other recorders may write ``ros2idl``.
-    """
-
-    name: str
-    type: str
-    definition: str
-    type_hash: str = ""
-    qos_yaml: str = ""
-    encoding: str = "cdr"
-    schema_encoding: str = "ros2msg"
+    name: str  # full topic name
+    type: str  # ``sensor_msgs/msg/JointState``
+    definition: str  # the message definition with its dependencies, ``ros2msg``
+    type_hash: str = ""  # ``RIHS01_…``, empty when not known
+    qos_yaml: str = ""  # the offered profiles, the YAML that the channel carries
+    encoding: str = "cdr"  # of the messages; ROS 2 writes ``cdr``
+    schema_encoding: str = "ros2msg"  # ``ros2msg``; other recorders may write ``ros2idl``
 
     def __hash__(self) -> int:
         return hash(self.name)  # looked up for every message; the definition is long
@@ -144,18 +115,9 @@ def joined(files: Sequence[BagFile]) -> BagFile:
 
 
 def bag_information(
-    files: Sequence[BagFile],
-    topics: Sequence[BagTopic],
-    *,
-    custom: Mapping[str, str] | None = None,
+    files: Sequence[BagFile], topics: Sequence[BagTopic], *, custom: Mapping[str, str] | None = None
 ) -> dict[str, Any]:
-    """Return the mapping ``rosbag2_bagfile_information`` of a bag.
-
-    Args:
-        files: its storage files in order, one at least.
-        topics: each once.
-        custom: short texts about the run, such as its seed.
-    """
+    """Return the mapping ``rosbag2_bagfile_information`` of a bag of ``files`` in their order."""
     whole = joined(files)
     return {
         "version": VERSION,

@@ -32,10 +32,7 @@ def split_number(path: Path) -> int:
 
 
 def storage_files(path: str | Path) -> tuple[Path, ...]:
-    """Return the MCAP files of a bag in their order.
-
-    Args:
-        path: a rosbag2 directory, finished or not, or one ``.mcap`` file.
+    """Return the MCAP files of a bag, a directory or one file, in their order.
 
     Raises:
         InputError: no such bag, a file of it missing, another storage, a newer version.
@@ -70,11 +67,7 @@ def refuse_foreign(directory: Path) -> None:
 
 
 def found_files(directory: Path) -> tuple[Path, ...]:
-    """Return the MCAP files in a directory, by the number at the end of their names.
-
-    Raises:
-        InputError: there is none.
-    """
+    """Return the MCAP files in a directory, at least one, by the number that ends their names."""
     files = sorted(directory.glob("*.mcap"), key=lambda file: (split_number(file), file.name))
     if not files:
         raise InputError(
@@ -84,15 +77,10 @@ def found_files(directory: Path) -> tuple[Path, ...]:
 
 
 def listing_notes(path: str | Path, counts: Mapping[str, int]) -> list[str]:
-    """Compare a bag with what it says of itself.
+    """Return what differs between a bag and what it says of itself, one sentence each.
 
-    Args:
-        path: the bag; nothing is compared for a single file.
-        counts: messages by topic, as they were read.
-
-    Returns:
-        One sentence each: on numbers of messages that are others in ``metadata.yaml``, on
-        files that it does not list, on missing numbers of splits.
+    These are numbers of messages by topic other than the ``counts`` that were read, files that are
+    not listed, and missing numbers of splits. Nothing is compared for a single file.
     """
     path = Path(path)
     if not path.is_dir():
@@ -148,9 +136,7 @@ def _refuse_foreign(information: Mapping[str, Any], directory: Path) -> None:
         raise InputError(f"has version {version}, newer than {VERSION}", where=str(where))
     if storage != "mcap" or mode.lower() == "message":
         raise InputError(
-            f"the storage is {storage} {mode}".strip(),
-            where=str(where),
-            fix=conversion(directory),
+            f"the storage is {storage} {mode}".strip(), where=str(where), fix=conversion(directory)
         )
 
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-AGAIN = 10
-"""Older times in succession, increasing, after which time is taken to have begun anew."""
-
-SIMULATED = "stiction_simulated_time"
-"""Metadata record that a recorder writes when it learns the first simulated time."""
+AGAIN = 10  # older times in succession, increasing, after which time is taken to have begun anew
+SIMULATED = "stiction_simulated_time"  # metadata record with the first simulated time
 
 
 class LogTime:
-    """Gives each message its log time, ns.
+    """Gives each message its log time, ns: that of reception until a simulated one is known.
 
-    Until a simulated time is known it is the time of reception. Simulated time that falls back
-    is passed over; when it goes on from there, as after the restart of a plant, log time goes
-    on with it from where it stood.
+    Simulated time that falls back is passed over; when it goes on from there, as after a restart of
+    a plant, log time goes on with it from where it stood.
     """
 
     def __init__(self) -> None:

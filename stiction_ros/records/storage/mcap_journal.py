@@ -22,17 +22,10 @@ class Writable(Protocol):
 
 
 class Journal:
-    """One MCAP file without chunks and without an end.
+    """One MCAP file without chunks and without an end, at a ``path`` that is not there yet.
 
-    Args:
-        path: a file that is not there yet.
-
-    Attributes:
-        path: the file.
-        size: its bytes.
-
-    What was written stands in the file when a method returns, so that a kill of this
-    process loses none of it. A record that the storage refuses leaves nothing behind: the
+    What was written stands in the file, of ``size`` bytes, when a method returns, so that a kill of
+    this process loses none of it. A record that the storage refuses leaves nothing behind: the
     file is cut back to its last whole record.
 
     Raises:
@@ -59,10 +52,7 @@ class Journal:
             return False
 
     def put_back(self) -> None:
-        """Write the file under its name again, after somebody has removed it.
-
-        What was written is still there until it is closed, so nothing is lost.
-        """
+        """Write the file again after somebody has removed it; until closed it is still there."""
         other = self.path.open("x+b", buffering=0)
         try:
             for begin in range(0, self.size, _BLOCK):

@@ -1,8 +1,6 @@
 """Reads the records of one MCAP file from its beginning, whole, unfinished or damaged.
 
-The readers of the package ``mcap`` want a finished file, or give back the torn message at the end
-of an unfinished one as if it were whole. This one gives back complete messages only, and compares
-every checksum that the file carries: of chunks, of the data, of the summary.
+Unlike the readers of ``mcap`` it gives back complete messages only and compares every checksum.
 """
 
 from __future__ import annotations
@@ -16,20 +14,10 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 import zstandard
+from mcap import records as mcap_records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import (
-    Channel,
-    Chunk,
-    DataEnd,
-    Footer,
-    McapRecord,
-    Message,
-    Metadata,
-    Schema,
-    Statistics,
-)
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from stiction_ros.errors import InputError
@@ -37,12 +25,10 @@ from stiction_ros.records.storage.bag_metadata import BagTopic
 from stiction_ros.records.storage.packed import SQLITE, conversion, opened
 
 MAGIC = b"\x89MCAP0\r\n"
-RECORD = struct.Struct("<BQ")
-"""Opcode and length of the content, before every record."""
+RECORD = struct.Struct("<BQ")  # opcode and length of the content, before every record
 
 FOOTER_HEAD = RECORD.pack(Opcode.FOOTER, 20)
-FOOTER_SIZE = len(FOOTER_HEAD) + 20 + len(MAGIC)
-"""Bytes of the footer with the magic behind it."""
+FOOTER_SIZE = len(FOOTER_HEAD) + 20 + len(MAGIC)  # bytes of the footer with the magic behind it
 
 _DAMAGE: tuple[type[Exception], ...] = (
     *(ValueError, ArithmeticError, RuntimeError, EOFError, MemoryError, struct.error),
@@ -61,11 +47,7 @@ class RawMessage(NamedTuple):
 
 
 class McapScan:
-    """One pass over an MCAP file.
-
-    Args:
-        path: the file.
-        salvage: pass over records that are damaged, with a note, instead of raising.
+    """One pass over an MCAP file; to ``salvage`` is to pass over damaged records with a note.
 
     Attributes:
         topics: channel id to topic, filled as :meth:`messages` goes on.
@@ -86,14 +68,13 @@ class McapScan:
         self.chunked = self.finished = self.damaged = False
         self.notes: list[str] = []
         self._salvage = salvage
-        self._schemas: dict[int, Schema] = {}
+        self._schemas: dict[int, mcap_records.Schema] = {}
 
     def messages(self) -> Iterator[RawMessage]:
-        """Yield every complete message in the order of the file.
+        """Yield every complete message in the order of the file, those before a damage first.
 
         Raises:
-            InputError: no such file, not an MCAP file, or damaged inside; what is before the
-                damage comes first.
+            InputError: no such file, not an MCAP file, or damaged inside.
         """
         try:
             with opened(self.path) as file:
@@ -139,43 +120,43 @@ class McapScan:
                 yield from found
             place = end
 
-    def _records(self, opcode: int, body: bytes) -> Iterable[McapRecord]:
+    def _records(self, opcode: int, body: bytes) -> Iterable[mcap_records.McapRecord]:
         """Return the records of a chunk, or the one record that there is."""
         stream = ReadDataStream(BytesIO(body))
         if opcode == Opcode.MESSAGE:
-            return [Message.read(stream, len(body))]
+            return [mcap_records.Message.read(stream, len(body))]
         if opcode == Opcode.CHUNK:
             self.chunked = True
-            return breakup_chunk(Chunk.read(stream), validate_crc=True)
+            return breakup_chunk(mcap_records.Chunk.read(stream), validate_crc=True)
         for kind, number in (
-            (Schema, Opcode.SCHEMA),
-            (Channel, Opcode.CHANNEL),
-            (Metadata, Opcode.METADATA),
+            (mcap_records.Schema, Opcode.SCHEMA),
+            (mcap_records.Channel, Opcode.CHANNEL),
+            (mcap_records.Metadata, Opcode.METADATA),
         ):
             if opcode == number:
                 return [kind.read(stream)]
         return []
 
-    def _take(self, records: Iterable[McapRecord], found: list[RawMessage]) -> None:
+    def _take(self, records: Iterable[mcap_records.McapRecord], found: list[RawMessage]) -> None:
         for record in records:
-            if isinstance(record, Message):
+            if isinstance(record, mcap_records.Message):
                 topic = self.topics.get(record.channel_id)
                 if topic is None:
                     raise ValueError(f"a message of channel {record.channel_id} that is not known")
                 self.counts[record.channel_id] += 1
                 found.append(RawMessage(topic, record.log_time, record.publish_time, record.data))
-            elif isinstance(record, Metadata):
+            elif isinstance(record, mcap_records.Metadata):
                 self.metadata.append((record.name, record.metadata))
             else:
                 self._learn([record])
 
-    def _learn(self, records: Iterable[McapRecord]) -> None:
+    def _learn(self, records: Iterable[mcap_records.McapRecord]) -> None:
         """Take topics; a summary repeats them, with those that have no message."""
         for record in records:
-            if isinstance(record, Schema):
+            if isinstance(record, mcap_records.Schema):
                 self._schemas[record.id] = record
-            elif isinstance(record, Channel):
-                schema = self._schemas.get(record.schema_id, Schema(0, b"", "", ""))
+            elif isinstance(record, mcap_records.Channel):
+                schema = self._schemas.get(record.schema_id, mcap_records.Schema(0, b"", "", ""))
                 self.counts.setdefault(record.id, 0)
                 self.topics[record.id] = BagTopic(
                     name=record.topic,
@@ -192,7 +173,9 @@ class McapScan:
         self.finished = True
         if self.damaged:  # of what was left out nothing more can be said
             return
-        expected = DataEnd.read(ReadDataStream(BytesIO(body.ljust(4, b"\0")))).data_section_crc
+        expected = mcap_records.DataEnd.read(
+            ReadDataStream(BytesIO(body.ljust(4, b"\0")))
+        ).data_section_crc
         if expected not in (0, checksum):
             self._broken(place, "the checksum of the data is wrong")
             return
@@ -200,7 +183,9 @@ class McapScan:
         try:
             summary = _summary(rest)
             self._learn(summary)
-            told = [one.message_count for one in summary if isinstance(one, Statistics)]
+            told = [
+                one.message_count for one in summary if isinstance(one, mcap_records.Statistics)
+            ]
             if told and told[0] != found:
                 fault = f"it says {told[0]} messages, there are {found}"
         except _DAMAGE as error:
@@ -244,15 +229,8 @@ def _is_closed(tail: bytes) -> bool:
     return tail.startswith(FOOTER_HEAD) and tail.endswith(MAGIC)
 
 
-def _summary(rest: bytes) -> list[McapRecord]:
-    """Return the records of a summary, its checksum compared.
-
-    Args:
-        rest: everything behind the end of the data, to the end of the file.
-
-    Raises:
-        ValueError: no footer or a wrong checksum; and what damaged records raise.
-    """
+def _summary(rest: bytes) -> list[mcap_records.McapRecord]:
+    """Return the records of a summary, its checksum compared."""
     if not _is_closed(rest[-FOOTER_SIZE:]):
         raise ValueError("no footer at its end")
     protected, (checksum,) = rest[: -len(MAGIC) - 4], struct.unpack_from("<I", rest, len(rest) - 12)
@@ -261,12 +239,12 @@ def _summary(rest: bytes) -> list[McapRecord]:
     return list(StreamReader(BytesIO(rest), skip_magic=True).records)
 
 
-def _intact_summary(file: BinaryIO) -> list[McapRecord]:
+def _intact_summary(file: BinaryIO) -> list[mcap_records.McapRecord]:
     """Return the records of a file's summary; none when it has none or it is damaged."""
     tail = _tail(file)
     if not _is_closed(tail):
         return []
-    footer = Footer.read(ReadDataStream(BytesIO(tail[len(FOOTER_HEAD) :])))
+    footer = mcap_records.Footer.read(ReadDataStream(BytesIO(tail[len(FOOTER_HEAD) :])))
     if not footer.summary_crc or not footer.summary_start:
         return []
     file.seek(min(footer.summary_start, file.tell()))

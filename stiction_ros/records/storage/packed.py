@@ -13,12 +13,10 @@ import zstandard
 
 from stiction_ros.errors import InputError
 
-SUFFIXES = (".zstd", ".zst")
-"""Ends of the names of files that are packed with Zstandard; rosbag2 writes the first."""
+SUFFIXES = (".zstd", ".zst")  # of files packed with Zstandard; rosbag2 writes the first
 
 SQLITE = b"SQLite format 3\0"
-ZSTD = b"\x28\xb5\x2f\xfd"
-"""First bytes of a file of either kind."""
+ZSTD = b"\x28\xb5\x2f\xfd"  # first bytes of a file of either kind
 
 
 def conversion(bag: Path) -> str:
@@ -32,12 +30,7 @@ def conversion(bag: Path) -> str:
 
 @contextlib.contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
-    """Open a storage file; one that is packed with Zstandard is unpacked into a temporary file.
-
-    Raises:
-        InputError: packed, and cut off or damaged.
-        OSError: it cannot be read, or the storage refuses.
-    """
+    """Open a storage file; one packed with Zstandard is unpacked into a temporary file."""
     with path.open("rb") as file:
         packed = file.read(len(ZSTD)) == ZSTD
         file.seek(0)
@@ -58,12 +51,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def unpacked(source: BinaryIO) -> Iterator[bytes]:
-    """Yield what one frame of Zstandard or several hold, a block at a time.
-
-    Raises:
-        EOFError: the last frame is cut off.
-        zstandard.ZstdError: it is damaged.
-    """
+    """Yield what frames of Zstandard hold, a block at a time; EOFError if the last is cut off."""
     frame = zstandard.ZstdDecompressor().decompressobj()
     while block := source.read(zstandard.DECOMPRESSION_RECOMMENDED_INPUT_SIZE):
         while block:

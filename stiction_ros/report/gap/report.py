@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,19 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapVerdict, Look
-from stiction_ros.discrepancy.answer.preview import preview
+from stiction_ros.discrepancy.answer.preview import Preview, preview
 from stiction_ros.discrepancy.gap.measure import levelled
 from stiction_ros.effects import FloatArray
 from stiction_ros.pages.frame import framed, text
-from stiction_ros.pages.plot import SCRIPT, Curve, against, over_time
-from stiction_ros.report.gap.effects import (
-    change_lines,
-    effect_card,
-    effect_figure,
-    preview_figures,
-)
-from stiction_ros.report.gap.words import CONTROLLER, called, candidate_of, named_figures, plain
-from stiction_ros.report.page import Cell, folded, number, table
+from stiction_ros.pages.plot import KINDS, SCRIPT, Curve, against, over_time
+from stiction_ros.report.gap import words as say
+from stiction_ros.report.page import Cell, card, folded, number, table
 from stiction_ros.signals.holds import stretches
 
 CANDIDATES = (
@@ -37,6 +32,7 @@ _HEADLINES = {
     GapVerdict.NONE: "The simulation explains the records",
     GapVerdict.UNTESTABLE: "These records cannot show what the simulation lacks",
 }
+WINDOW = 400  # samples that are drawn, where an effect moves PV most
 
 
 def report_gap(found: Discrepancy, out: str | Path) -> Path:
@@ -82,15 +78,15 @@ def _headline(found: Discrepancy) -> str:
     if not names and not found.alternatives and found.process_changes:
         return f"The process is another than the model: {'; '.join(change_lines(found))}"
     if not names:
-        names = [" or ".join(called(*name) for name in found.alternatives)]
+        names = [" or ".join(say.called(*name) for name in found.alternatives)]
     return _HEADLINES[found.verdict].format(what=", and ".join(names))
 
 
 def _called(effect: FoundEffect) -> str:
-    named = called(effect.place, effect.effect)
+    named = say.called(effect.place, effect.effect)
     if not effect.alternatives:
         return named
-    return f"{named} (or {' or '.join(called(*name) for name in effect.alternatives)})"
+    return f"{named} (or {' or '.join(say.called(*name) for name in effect.alternatives)})"
 
 
 def _decides(found: Discrepancy) -> list[str]:
@@ -136,7 +132,7 @@ def _gate(found: Discrepancy) -> str:
     if gate.set_point_moves is not None:
         moves = ", ".join(map(str, gate.set_point_moves))
         lines.append(f"set-point moves: {moves}")
-    lines.append(CONTROLLER[found.controller.status])
+    lines.append(say.CONTROLLER[found.controller.status])
     lines += found.notes
     return _listed(lines)
 
@@ -161,20 +157,20 @@ def _gaps(found: Discrepancy) -> str:
 
 
 def _look(found: Discrepancy, look: Look, k: int) -> list[str]:
-    listed = "".join(f"<li>{text(plain(said))}</li>" for said in look.where.sentences)
+    listed = "".join(f"<li>{text(say.plain(said))}</li>" for said in look.where.sentences)
     rows: list[list[Cell]] = []
     for fit in look.scores.fits:
         outside = "" if fit.candidate.inside else ", outside the catalogue"
         rows.append(
             [
-                candidate_of(fit) + outside,
-                named_figures(found, fit),
+                say.candidate_of(fit) + outside,
+                say.named_figures(found, fit),
                 number(fit.delta_bic),
                 number(round(fit.held_gain, 3) + 0.0),
             ]
         )
     head = ("candidate", "figures", "BIC gained", "held-out gain")
-    said = plain(f"{look.decision.verdict}: {look.decision.reason}")
+    said = say.plain(f"{look.decision.verdict}: {look.decision.reason}")
     after = "it stays in the model" if look.kept else look.reason
     if not after or after == look.decision.reason:
         after = "nothing is added"
@@ -183,7 +179,7 @@ def _look(found: Discrepancy, look: Look, k: int) -> list[str]:
         f"<ul>{listed}</ul>" if listed else "<p>At no particular time or place.</p>",
         _tracks(found, look),
         f"<h2>Look {k + 1}: the candidates</h2>",
-        f"<p>{text(said)}; {text(plain(after))}.</p>",
+        f"<p>{text(said)}; {text(say.plain(after))}.</p>",
         f"<p class='soft'>{CANDIDATES}</p>",
         table(head, rows, texts=2),
     ]
@@ -192,7 +188,9 @@ def _look(found: Discrepancy, look: Look, k: int) -> list[str]:
 def _untestable(found: Discrepancy) -> str:
     if not found.untestable:
         return "<p>Every effect of the catalogue would have been seen.</p>"
-    rows = [[called(t.place, t.effect), t.experiment, number(t.expected)] for t in found.untestable]
+    rows = [
+        [say.called(t.place, t.effect), t.experiment, number(t.expected)] for t in found.untestable
+    ]
     return table(("effect", "what would help", "BIC expected"), rows, texts=2)
 
 
@@ -235,7 +233,7 @@ def _tracks(found: Discrepancy, look: Look) -> str:
     if not look.where.tracks or look.where.tracks[0].gain <= 0.0:
         return ""
     track = look.where.tracks[0]
-    place, curve = plain(track.place), Curve("disturbance", "free", track.wave)
+    place, curve = say.plain(track.place), Curve("disturbance", "free", track.wave)
     driver, label = _driver(found, look, track.place)
     time = np.arange(float(len(found.runs))) * found.runs.sample_time
     return over_time(
@@ -258,3 +256,91 @@ def _driver(found: Discrepancy, look: Look, place: str) -> tuple[FloatArray, str
         return found.runs.op[:, names.index(tag)], f"OP of {tag} (%)"
     i = found.model_before.outputs.index(tag)
     return look.scores.base.run.forced[:, i], f"free run of {tag}"
+
+
+def effect_card(effect: FoundEffect) -> str:
+    """Return the box of one effect: place, law, figures with units, and why it."""
+    lines = say.figures_with_units(effect)
+    if effect.alternatives:
+        others = " or ".join(say.called(*name) for name in effect.alternatives)
+        lines.append(f"or {others}: these records do not tell them apart")
+    if np.isfinite(effect.closed):
+        lines.append(f"closes {100.0 * effect.closed:.0f} % of the gap by itself")
+    if effect.sentence:
+        lines.append(f"{effect.sentence}.")
+    kind = "bad" if effect.verdict is GapVerdict.NAMED else "open"
+    law = "" if effect.law is None else f" (law {effect.law})"
+    return card(
+        kind, say.place_of(effect.place), say.word_of(effect.effect) + law, "\n".join(lines)
+    )
+
+
+def effect_figure(found: Discrepancy, effect: FoundEffect) -> str:
+    """Return what an effect does to the output that it moves most; nothing where it moves none."""
+    if effect.moves is None or not float(np.ptp(effect.moves)) > 0.0:
+        return ""
+    base = levelled(found.base_after)
+    scored = np.column_stack([blocks.scored for blocks in base.blocks])
+    moves = np.where(scored, effect.moves, np.nan)
+    i = int(np.argmax(np.nanstd(moves, axis=0)))
+    rows, name = _liveliest(moves[:, i]), found.model_before.outputs[i]
+    pv = base.run.runs.pv[rows, i]
+    with_it = np.where(scored[rows, i], pv - base.noise[i].residual[rows], np.nan)
+    return over_time(
+        f"What it does: {say.called(effect.place, effect.effect)}, in the {rows.stop - rows.start} "
+        f"samples in which it moves {name} most. Both free runs are driven by the recorded OP "
+        "alone.",
+        np.arange(float(rows.start), rows.stop) * found.runs.sample_time,
+        [
+            Curve(f"{name}, measured", "whole", pv),
+            Curve("free run without it", "op", with_it - moves[rows, i]),
+            Curve("free run with it", "pv", with_it),
+        ],
+        text(name),
+    )
+
+
+def _liveliest(moves: np.ndarray[tuple[int], np.dtype[np.float64]]) -> slice:
+    """Return where a signal, NaN where it does not count, is farthest from its mean."""
+    count = min(WINDOW, len(moves))
+    squares = np.concatenate([[0.0], np.nancumsum((moves - np.nanmean(moves)) ** 2)])
+    inside = squares[count:] - squares[:-count]
+    first = int(np.argmax(inside))
+    return slice(first, first + count)
+
+
+def preview_figures(preview: Preview) -> str:
+    """Return what each rival would show in the experiment that decides."""
+    time = np.arange(float(len(preview.op))) * preview.sample_time
+    rivals = [(say.called(rival.place, rival.effect), rival) for rival in preview.rivals]
+    signals = {
+        "stem": "stem (%)",
+        "pv": f"{preview.output} as the sensor shows it",
+        "true": f"{preview.output} itself, as a second sensor would show it",
+    }
+    op = over_time(
+        "What would decide: OP moved by hand with the controller off: up, back, and one step, "
+        "without noise.",
+        *(time, [Curve(f"OP of {preview.valve}", "op", preview.op, steps=True)], "%"),
+    )
+    figures = []
+    for signal, label in signals.items():
+        drawn = [
+            Curve(name, kind, getattr(rival, signal))
+            for (name, rival), kind in zip(rivals, itertools.cycle(KINDS), strict=False)
+        ]
+        differ = _apart([curve.values for curve in drawn])
+        said = f"{label}: {'the rivals differ' if differ else 'the rivals are alike'}."
+        figures.append(over_time(said[0].upper() + said[1:], time, drawn, text(label)))
+    return op + "".join(figures)
+
+
+def _apart(signals: list[np.ndarray[tuple[int], np.dtype[np.float64]]]) -> bool:
+    spread = max(float(np.ptp(each)) for each in signals)
+    first = signals[0]
+    return any(float(np.abs(each - first).max()) > 0.02 * max(spread, 1e-12) for each in signals)
+
+
+def change_lines(found: Discrepancy) -> list[str]:
+    """Return what of the process was changed, one line each."""
+    return [f"{change.output}: {change.sentence}" for change in found.process_changes]

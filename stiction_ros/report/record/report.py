@@ -9,24 +9,22 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, ValveEstimate
+from stiction_ros.identification.answer.words import cycle, materiality, next_step, why
 from stiction_ros.identification.judgement.figures import definitions
-from stiction_ros.pages.frame import framed, text
+from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT, Curve, over_time
 from stiction_ros.pages.signals import UNITS, all_signals, close_look
 from stiction_ros.records.parts import joined, span
 from stiction_ros.records.record import Record
+from stiction_ros.records.valve_work import ValveWork
 from stiction_ros.report.page import Cell, number, page_file, table
-from stiction_ros.report.record.sections import lead, work_table
 from stiction_ros.report.run.identified import process_table, valve_cards, verdict_line
 from stiction_ros.report.shapes import free_run, responses
 from stiction_ros.texts import finite, probability
 
 
 def report_record(
-    record: Record,
-    identification: Identification,
-    out: str | Path,
-    parts: Sequence[Record] = (),
+    record: Record, identification: Identification, out: str | Path, parts: Sequence[Record] = ()
 ) -> Path:
     """Write the page of a record and return its file.
 
@@ -140,3 +138,35 @@ def _free_runs(record: Record, found: Identification) -> str:
         )
         drawn.append(over_time(said, record.time, curves, UNITS.axis(model.name), record.start))
     return "<h2>Model against measurement</h2>" + "".join(drawn) if drawn else ""
+
+
+def lead(found: Identification) -> str:
+    """Return why each valve is what it is said to be, what makes the cycle, and what to do next."""
+    told = [
+        " ".join(filter(None, (why(found, j), materiality(valve))))
+        for j, valve in enumerate(found.valves)
+    ]
+    told += [said for model in found.outputs if (said := cycle(model))]
+    steps = [
+        f"<b>What to do next:</b> {words(next_step(found, j))}" for j in range(len(found.valves))
+    ]
+    leads = [f'<p class="lead">{words(said)}</p>' for said in told]
+    return "".join([*leads, *(f"<p>{step}</p>" for step in steps)])
+
+
+def work_table(record: Record, found: Identification) -> str:
+    """Return what OP and stem travel in an hour."""
+    hours = len(record) * record.sample_time / 3600.0
+    rows: list[list[Cell]] = []
+    for j, name in enumerate(record.valves):
+        signals = {f"OP of {name}": record.op[:, j]}
+        if found.stem.shape == record.op.shape:
+            signals[f"stem of {name}, estimated"] = found.stem[:, j]
+        for what, values in signals.items():
+            work = ValveWork.of(values).per_hour(hours)
+            rows += [
+                [f"{what}: travel per hour, %", number(work.travel)],
+                [f"{what}: moves per hour (samples at which it moves)", number(work.moves)],
+                [f"{what}: reversals per hour", number(work.reversals)],
+            ]
+    return "<h2>Valve work</h2>" + table(["", "in this record"], rows)

@@ -11,8 +11,7 @@ from stiction_ros.report.page import Cell, card, duration, interval, number, per
 from stiction_ros.report.run.story import Story
 from stiction_ros.texts import probability, symbol
 
-KINDS = {"sticky": "bad", "backlash": "bad", "healthy": "good"}
-"""Class of a box by its verdict; the others are open."""
+KINDS = {"sticky": "bad", "backlash": "bad", "healthy": "good"}  # of boxes; others are open
 
 
 def verdict_line(valves: Sequence[Mapping[str, Any]]) -> str:
@@ -43,12 +42,7 @@ def has_friction(valve: Mapping[str, Any]) -> bool:
 
 
 def valve_cards(valves: Sequence[Mapping[str, Any]], story: Story | None = None) -> str:
-    """Return one box a valve: verdict, friction with intervals, and the truth where known.
-
-    Args:
-        valves: entries of ``identify --json``.
-        story: of the run, where there is one.
-    """
+    """Return one box a valve: verdict, friction with intervals, and the truth where known."""
     boxes = []
     for valve in valves:
         more = (

@@ -2,28 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.events import ModeChange
-from stiction_ros.report.page import (
-    Cell,
-    count,
-    duration,
-    folded,
-    interval,
-    number,
-    percent,
-    table,
-)
+from stiction_ros.records.run.log import RunLog
+from stiction_ros.report.page import Cell, count, duration, folded, interval, number, percent, table
+from stiction_ros.report.run import identified
 from stiction_ros.report.run.figures import draw_run
-from stiction_ros.report.run.identified import (
-    KINDS,
-    has_friction,
-    process_table,
-    valve_cards,
-    verdict_line,
-)
-from stiction_ros.report.run.monitor_section import monitor_section
 from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import Story
 from stiction_ros.report.run.summary import measured, messages
@@ -50,13 +38,13 @@ def run_page(story: Story) -> str:
         f'<p class="soft">Loop {text(story.name)}: {text(kicker)}</p>',
         _trouble(story),
         *[f'<p class="lead">{words(line)}</p>' for line in findings(story)],
-        valve_cards(story.identified.get("valves", []), story),
+        identified.valve_cards(story.identified.get("valves", []), story),
         _gain(story),
         _work(story),
         *draw_run(story),
         _fits(story),
         monitor_section(story.log),
-        process_table(story.identified.get("outputs", []), record.sample_time),
+        identified.process_table(story.identified.get("outputs", []), record.sample_time),
         _messages(story),
         _configuration(story),
         _notes(story),
@@ -67,8 +55,8 @@ def run_page(story: Story) -> str:
 def headline(story: Story) -> str:
     """Return the answer in one line: which valve, and what became of it."""
     verdicts = story.identified.get("valves", [])
-    line = verdict_line(verdicts)
-    if not any(map(has_friction, verdicts)):
+    line = identified.verdict_line(verdicts)
+    if not any(map(identified.has_friction, verdicts)):
         return line
     if story.log.swap is None:
         return f"{line}; the controller was not swapped"
@@ -119,7 +107,7 @@ def _later_changes(story: Story, swap: ModeChange) -> list[str]:
 
 def _trouble(story: Story) -> str:
     found = story.phases
-    stuck = any(map(has_friction, story.identified.get("valves", [])))
+    stuck = any(map(identified.has_friction, story.identified.get("valves", [])))
     if found.status is PhaseStatus.OK or (story.log.swap is None and not stuck):
         return ""
     return f'<p class="note warn">No comparison of before and after: {text(found.reason)}.</p>'
@@ -241,7 +229,7 @@ def _fits(story: Story) -> str:
                 [
                     duration(log.seconds(fit.stamp)),
                     name,
-                    (KINDS.get(verdict, ""), verdict),
+                    (identified.KINDS.get(verdict, ""), verdict),
                     percent(valve["f_s"]),
                     interval(valve["f_s_interval"]),
                     percent(valve["f_d"]),
@@ -304,3 +292,33 @@ def _notes(story: Story) -> str:
     if not notes:
         return ""
     return "<h2>Notes</h2><ul>" + "".join(f"<li>{text(note)}</li>" for note in notes) + "</ul>"
+
+
+def monitor_section(log: RunLog) -> str:
+    """Return every measurement of the gap with what was found; empty without a monitor."""
+    looks = log.gaps.looks
+    if not looks:
+        return ""
+    rows: list[list[Cell]] = []
+    for stamp, look in looks.items():
+        found = log.gaps.findings.get(stamp, {})
+        outputs = look.get("outputs", {})
+        rows.append(
+            [
+                duration(log.seconds(stamp)),
+                ("bad", "grown") if look.get("grown") else "as in the baseline",
+                str(found.get("text", "")) or str(look.get("failure", "")),
+                ", ".join(f"{name} {_growth(one)}" for name, one in outputs.items()),
+            ]
+        )
+    grown = sum(bool(look.get("grown")) for look in looks.values())
+    said = f"The gap between loop and model was measured {len(looks)} times; "
+    said += f"in {grown} of them it had grown." if grown else "it never grew."
+    head = ("window ends", "gap", "found", "times the baseline’s (limit)")
+    return f"<h2>The monitor</h2><p>{words(said)}</p>" + table(head, rows, texts=3)
+
+
+def _growth(look: Mapping[str, Any]) -> str:
+    gap, baseline, limit = (look.get(key) for key in ("gap", "baseline", "limit"))
+    share = gap / baseline if isinstance(gap, float) and baseline else None
+    return f"{number(share)} ({number(limit)})"

@@ -16,14 +16,7 @@ from stiction_ros.report.run.summary import summary, write_json
 
 @dataclasses.dataclass(frozen=True)
 class RunReport:
-    """What was written.
-
-    Attributes:
-        story: the run and its scores.
-        summary: the mapping in ``summary.json``.
-        page: ``report.html``.
-        files: everything that was written.
-    """
+    """What was written: the story of the run, ``summary.json``, the page, and all files."""
 
     story: Story
     summary: dict[str, Any]
@@ -48,12 +41,8 @@ def report_run(
         out: folder, made when missing; or the ``.html`` file alone.
         scenario: that was run, for the comparison with a loop without friction.
         name: of the loop in the report; the scenario's or the bag's when not given.
-        seconds: wall time of the run, when measured better than by the bag.
-        load: of the machine before the run, processes that want a core, where known.
+        seconds, load: wall time of the run, and of the machine before it, where known.
         namespace: of the loop's topics, for a bag that holds several loops.
-
-    Raises:
-        InputError: as :func:`stiction_ros.records.run.log.read_run`.
     """
     log = read_run(bag, namespace=namespace)
     return write_run(tell(log, scenario=scenario, name=name), out, seconds, load)

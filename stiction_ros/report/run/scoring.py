@@ -3,15 +3,12 @@
 Everything is computed from the error e = PV − SP inside the *holds*: the stretches of samples
 between two moves of any set-point.
 
-- *Dominant period* T of the phase `before` and *amplitude* of an output, √2 × RMS of the
-  spectral line at T: see :mod:`stiction_ros.signals.oscillation`.
+- *Amplitude*: √2 × RMS of the spectral line at the dominant period of the phase `before`.
 - *Offset*: mean over the holds of |mean e| over their last 50 samples. Holds of fewer than
   100 samples have not settled by then and do not count, unless all are shorter.
-- *Work* of each valve per hour, and the largest move of its OP from one sample to the next: see
-  :mod:`stiction_ros.records.valve_work`.
-- *IAE per hour*: ∫|e|dt over all samples of the phase, per hour, minus the share of white
-  measurement noise, E|v| = √(2/π) σ ≈ 0.798 σ. With time in hours on both sides that is
-  mean |e| − 0.798 σ, in PV units × h per h.
+- *Work* of each valve per hour, and the largest move of its OP from one sample to the next.
+- *IAE per hour*: ∫|e|dt per hour, minus the share of white measurement noise, E|v| = √(2/π) σ ≈
+  0.798 σ. With time in hours on both sides that is mean |e| − 0.798 σ, in PV units × h per h.
 """
 
 from __future__ import annotations
@@ -26,14 +23,8 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records import Record
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.valve_work import ValveWork, largest_op_step, work_per_hour
+from stiction_ros.signals import oscillation
 from stiction_ros.signals.holds import holds
-from stiction_ros.signals.oscillation import (
-    LEAST_LINE,
-    NEEDED_CYCLES,
-    Cycle,
-    amplitude,
-    dominant_cycle,
-)
 
 OFFSET_SAMPLES = 50
 NOISE_SHARE = float(np.sqrt(2 / np.pi))  # E|v| of white noise with σ = 1
@@ -51,18 +42,13 @@ class PhaseStatus(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Score:
-    """How one output behaved during one phase, in its engineering units.
+    """How one output behaved during one phase, in its engineering units."""
 
-    Attributes:
-        amplitude: of the spectral line at the dominant period; None when no hold is long
-            enough to measure it or there is no period.
-        offset: |mean error| at the end of the holds.
-        iae_per_hour: mean |error| less the share of known noise, PV units × h per h.
-    """
-
+    # of the spectral line at the dominant period; None when no hold is long enough to measure it or
+    # there is no period
     amplitude: float | None
-    offset: float
-    iae_per_hour: float
+    offset: float  # |mean error| at the end of the holds
+    iae_per_hour: float  # mean |error| less the share of known noise, PV units × h per h
 
     def to_dict(self) -> dict[str, float | None]:
         """Return the mapping of ``summary.json``."""
@@ -71,45 +57,28 @@ class Score:
 
 @dataclasses.dataclass(frozen=True)
 class Phase:
-    """A stretch of samples, and what it is measured by.
+    """A stretch of samples, and what it is measured by."""
 
-    Attributes:
-        first, last: its samples, the last one not included.
-        scores: by output.
-        work: of each valve per hour; empty where the stems are unknown.
-        op_step: largest move of each OP from one sample to the next, by valve, %.
-    """
-
-    first: int
+    first: int  # first, last: its samples, the last one not included
     last: int
-    scores: Mapping[str, Score]
-    work: Mapping[str, ValveWork]
-    op_step: Mapping[str, float]
+    scores: Mapping[str, Score]  # by output
+    work: Mapping[str, ValveWork]  # of each valve per hour; empty where the stems are unknown
+    op_step: Mapping[str, float]  # largest move of each OP from one sample to the next, by valve, %
 
 
 @dataclasses.dataclass(frozen=True)
 class Phases:
-    """The rounds of the schedule before and after the swap, scored alike.
+    """The rounds of the schedule before and after the swap, scored alike."""
 
-    Attributes:
-        status: ok, or why the two cannot be compared.
-        reason: one sentence; empty when ok.
-        cycle: of ``before``, None when it could not be looked for.
-        before, after: None where there is no whole round.
-    """
-
-    status: PhaseStatus
-    reason: str
-    cycle: Cycle | None
-    before: Phase | None
+    status: PhaseStatus  # ok, or why the two cannot be compared
+    reason: str  # one sentence; empty when ok
+    cycle: oscillation.Cycle | None  # of ``before``, None when it could not be looked for
+    before: Phase | None  # before, after: None where there is no whole round
     after: Phase | None
 
 
 def round_length(sp: FloatArray) -> int | None:
-    """Return the samples after which the moves of ``sp``, shape (N, p), repeat exactly.
-
-    None when they do not repeat, or when nothing moves.
-    """
+    """Return the samples after which moves of ``sp``, (N, p), repeat exactly; None if never."""
     moves = [first for first, _ in holds(sp)[1:]]
     for length in moves:
         if 2 * length <= len(sp) and np.array_equal(sp[length:], sp[:-length]):
@@ -134,10 +103,8 @@ def score(
 ) -> Phase:
     """Score every output over samples ``first`` up to, not including, ``last``.
 
-    Args:
-        record: with set-points; without them the mean of each PV stands in.
-        period: dominant period, samples; None leaves amplitudes out.
-        noise_std: σ of the measurement noise of each output where known, else 0.
+    Without set-points the mean of each PV stands in, without a period, samples, amplitudes are left
+    out; ``noise_std`` is σ of the measurement noise of each output where known, else 0.
     """
     part = record.part(first, last)
     there = part.quality != Quality.BAD
@@ -147,7 +114,7 @@ def score(
         last,
         {
             name: Score(
-                None if period is None else amplitude(error[:, j], stretches, period),
+                None if period is None else oscillation.amplitude(error[:, j], stretches, period),
                 offset(error[:, j], stretches),
                 iae_per_hour(error[there, j], noise_std[j]),
             )
@@ -182,12 +149,6 @@ def phases(
 
     Rounds are counted from the first sample. Without a repeating schedule everything before
     the swap is set against everything after it, which the caller should say.
-
-    Args:
-        record: of the whole run.
-        swap: first sample of the new controller; None when there was none.
-        round_samples: length of one round of the set-point schedule.
-        noise_std: σ of the measurement noise of each output where known.
     """
     sigma = [0.0] * len(record.outputs) if noise_std is None else list(noise_std)
     if swap is None or not 0 < swap < len(record):
@@ -209,7 +170,7 @@ def phases(
     if _gap(record, *spans[:2]):
         reason = "the record has a gap in the last round of set-points before the swap"
         return Phases(PhaseStatus.NO_ROUND, reason, None, None, None)
-    cycle = dominant_cycle(*errors(record.part(spans[0], spans[1])))
+    cycle = oscillation.dominant_cycle(*errors(record.part(spans[0], spans[1])))
     period = None if cycle is None else cycle.period
     before = score(record, spans[0], spans[1], period, sigma)
     if spans[3] > len(record):
@@ -234,7 +195,7 @@ def _unswapped(record: Record, round_samples: int | None, sigma: Sequence[float]
     if _gap(record, first, last):
         reason += ", and most of its last round of set-points is missing in the record"
         return Phases(PhaseStatus.NO_SWAP, reason, None, None, None)
-    cycle = dominant_cycle(*errors(record.part(first, last)))
+    cycle = oscillation.dominant_cycle(*errors(record.part(first, last)))
     before = score(record, first, last, None if cycle is None else cycle.period, sigma)
     return Phases(PhaseStatus.NO_SWAP, reason, cycle, before, None)
 
@@ -245,13 +206,13 @@ def _gap(record: Record, first: int, last: int) -> bool:
     return bool(missing.mean() > MOST_MISSING)
 
 
-def _no_cycle(cycle: Cycle | None) -> str:
+def _no_cycle(cycle: oscillation.Cycle | None) -> str:
     """Return why there is no limit cycle to judge by; empty when there is one."""
-    if cycle is None or cycle.share < LEAST_LINE:
+    if cycle is None or cycle.share < oscillation.LEAST_LINE:
         return "the loop did not cycle in the last round of set-points before the swap"
-    if cycle.count < NEEDED_CYCLES:
+    if cycle.count < oscillation.NEEDED_CYCLES:
         return (
             f"the loop made {cycle.count} whole cycles in the last round of set-points before "
-            f"the swap, at least {NEEDED_CYCLES} are needed"
+            f"the swap, at least {oscillation.NEEDED_CYCLES} are needed"
         )
     return ""

@@ -22,29 +22,17 @@ TANK_UNITS = {"C": "kg/m³", "T": "°C"}
 
 @dataclasses.dataclass(frozen=True)
 class Story:
-    """A run of the live loop, ready to be told.
+    """A run of the live loop, ready to be told."""
 
-    Attributes:
-        name: of the scenario or the bag.
-        log: what the bag holds.
-        phases: before and after the swap.
-        stiction_free: the same moves with ideal valves, None when not simulated.
-        free_record: record of that run.
-        truth: the loop that the plant node simulated; None for a real plant.
-        seed: of the plant's noise, None when unknown.
-        round_samples: samples of one round of the set-points, None when they do not repeat.
-        units: engineering unit of each PV where known.
-    """
-
-    name: str
-    log: RunLog
-    phases: Phases
-    stiction_free: Phase | None
-    free_record: Record | None
-    truth: LoopModel | None
-    seed: int | None
-    round_samples: int | None
-    units: Mapping[str, str]
+    name: str  # of the scenario or the bag
+    log: RunLog  # what the bag holds
+    phases: Phases  # before and after the swap
+    stiction_free: Phase | None  # the same moves with ideal valves, None when not simulated
+    free_record: Record | None  # record of that run
+    truth: LoopModel | None  # the loop that the plant node simulated; None for a real plant
+    seed: int | None  # of the plant's noise, None when unknown
+    round_samples: int | None  # samples of one round of set-points, None when they do not repeat
+    units: Mapping[str, str]  # engineering unit of each PV where known
 
     @property
     def record(self) -> Record:
@@ -68,10 +56,7 @@ class Story:
         return self.log.fits[-1].identification if self.log.fits else {}
 
     def true_friction(self, valve: str) -> tuple[float, float] | None:
-        """Return f_S and f_D in the simulated plant, (0, 0) for a valve without friction.
-
-        None where they are not known: of a real plant, and of a law that has no such figures.
-        """
+        """Return f_S and f_D of the simulated plant, (0, 0) for an ideal valve, None if unknown."""
         if self.truth is None:
             return None
         for entry in self.truth.valves:
@@ -89,13 +74,7 @@ def _frictions(law: Behaviour) -> tuple[float, float] | None:
 
 
 def tell(log: RunLog, *, scenario: Scenario | None = None, name: str | None = None) -> Story:
-    """Score a run.
-
-    Args:
-        log: of the run, from a bag or from :func:`log_of`.
-        scenario: that was run; with it the stiction-free loop is simulated for comparison.
-        name: for headings; the scenario's or the record's when not given.
-    """
+    """Score a run; with the ``scenario`` that was run the stiction-free loop is simulated, too."""
     record = log.record
     truth, seed = simulated_plant(log)
     if scenario is not None:

@@ -16,11 +16,7 @@ def summary(
 ) -> dict[str, Any]:
     """Return the mapping of ``summary.json``; numbers that do not exist are null.
 
-    Args:
-        story: of the run.
-        seconds: wall time of the run; without it the time between the first and the last
-            publication in the bag.
-        load: of the machine before the run, where known.
+    Without the wall time in ``seconds`` it is that between first and last publication in the bag.
     """
     log, record, free = story.log, story.record, story.stiction_free
     seconds = log.wall_seconds if seconds is None else seconds

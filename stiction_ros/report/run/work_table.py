@@ -16,12 +16,7 @@ KEYS = (
 def work_rows(
     summary: Mapping[str, Any], phases: Sequence[str]
 ) -> list[tuple[str, str, list[float | None]]]:
-    """Return rows of a valve, a measure and its value in each of ``phases``; None if unknown.
-
-    Args:
-        summary: with ``valve_work`` and ``largest_op_step``, as in ``summary.json``.
-        phases: names such as ``before``, in the order of the columns.
-    """
+    """Return rows of a valve, a measure and its value in each of ``phases``; None if unknown."""
     steps, work = summary["largest_op_step"], summary["valve_work"]
     valves = next((list(steps[name]) for name in phases if name in steps), [])
     rows = []

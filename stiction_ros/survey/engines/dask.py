@@ -1,7 +1,6 @@
 """Workers of a Dask cluster that someone runs: here loops are only handed in and taken out.
 
-The scheduler gives a loop whose worker was lost to another one by itself. It runs whatever it is
-sent, so it belongs into a closed network; with TLS in Dask's own settings it is reached by that.
+It runs whatever it is sent, so it belongs into a closed network, or behind TLS in Dask's settings.
 """
 
 from __future__ import annotations
@@ -17,22 +16,15 @@ from stiction_ros.survey.survey_options import SurveyOptions
 
 SCHEME = "dask://"
 
-AHEAD = 3
-"""Loops handed in for each thread of the cluster: one at work, others on their way."""
-
-PATIENCE = 15.0
-"""Seconds within which a scheduler must answer."""
+AHEAD = 3  # loops handed in for each thread of the cluster: one at work, others on their way
+PATIENCE = 15.0  # seconds within which a scheduler must answer
 
 
 class DaskEngine:
     """A scheduler and its workers."""
 
     def __init__(self, address: str) -> None:
-        """Connect to ``dask://HOST:PORT``.
-
-        Raises:
-            InputError: Dask is not installed, nobody answers, or there is no worker.
-        """
+        """Connect to ``dask://HOST:PORT``; refused without Dask, an answer or a worker."""
         try:
             import dask
             import distributed

@@ -11,8 +11,7 @@ from stiction_ros.survey.assess import Assessed
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.survey_options import SurveyOptions
 
-ATTEMPTS = 3
-"""Times that a loop is tried whose worker dies: one that kills workers must not kill all."""
+ATTEMPTS = 3  # times that a loop is tried whose worker dies: it may kill workers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,13 +51,7 @@ class Engine(Protocol):
 
 
 def lost(task: Task, reason: str, *, again: bool = False) -> Done:
-    """Return a loop that could not be judged.
-
-    Args:
-        task: that was lost.
-        reason: one sentence without a full stop.
-        again: whether that says nothing of the loop, as its worker died.
-    """
+    """Return a loop that could not be judged, for a reason that may pass when tried ``again``."""
     loop = task.loop
     entry = Entry(
         loop.name,

@@ -1,42 +1,37 @@
 """Worker processes of this machine: the engine that needs nothing else.
 
-Workers are forked from one process that has imported what they need. One that is killed is replaced
-and its loop tried once more. One loop is with each worker at a time and one more is drawn when it
-comes back, so memory does not grow with the plant. One worker is started first and the others when
-it is ready, so that where none can start this is said once. A worker first loads or compiles its
-machine code and says that it is ready; only then is it sent its loop, and the loop's time begins:
-what a busy machine takes to start is no loop's fault.
+Workers are forked from one process that has imported what they need, the first of them alone. One
+that is killed is replaced and its loop tried once more. A worker gets its loop when it is ready.
 """
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
+import multiprocessing
+import os
 import signal
+import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.process import BaseProcess
+from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification.warm_up import compile_loops
 from stiction_ros.intake.loop import Loop
+from stiction_ros.orphans import spared
 from stiction_ros.survey.assess import Assessed, assess
 from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Task, lost
-from stiction_ros.survey.engines.start import context_of, started
 from stiction_ros.survey.survey_options import SurveyOptions
 
-LONGEST = 600.0
-"""Seconds that one loop may take; a usual one takes a second or two."""
-
-READY = "ready"
-"""What a worker says once, before its first loop."""
-
-SIGNAL = "signal"
-"""Begins how a worker ended that was killed: by chance, or as memory ran out."""
-
-ENDS_WITHIN = 2.0
-"""Seconds that a worker is given to end by itself."""
+LONGEST = 600.0  # seconds that one loop may take; a usual one takes a second or two
+READY = "ready"  # what a worker says once, before its first loop
+SIGNAL = "signal"  # begins how a worker ended that was killed: by chance, or as memory ran out
+ENDS_WITHIN = 2.0  # seconds that a worker is given to end by itself
 
 
 @dataclasses.dataclass
@@ -64,12 +59,7 @@ class LocalEngine:
     name = "local"
 
     def __init__(self, jobs: int, longest: float = LONGEST) -> None:
-        """Start no process yet.
-
-        Args:
-            jobs: processes, one at least.
-            longest: seconds that a loop may take, from when a worker that is ready has it.
-        """
+        """Start no process yet; a worker that is ready may take ``longest`` seconds for a loop."""
         self._jobs, self._longest = max(jobs, 1), longest
         self._workers: list[_Worker] = []
         self._proven = False
@@ -85,11 +75,7 @@ class LocalEngine:
         return tuple(worker.process.pid or 0 for worker in self._workers)
 
     def run(self, tasks: Iterable[Task], options: SurveyOptions) -> Iterator[Done]:
-        """Yield what is said of each loop as it comes.
-
-        Raises:
-            InputError: the first worker ends before it is ready, as no other would get further.
-        """
+        """Yield what is said of each loop as it comes; refused if no worker gets ready."""
         waiting = iter(tasks)
         exhausted = False
         try:
@@ -218,3 +204,42 @@ def _work(pipe: Connection, options: SurveyOptions) -> None:
             pipe.send(answer)
         except (BrokenPipeError, OSError):
             return
+
+
+def context_of(module: str) -> ForkServerContext | SpawnContext:
+    """Return how processes are started here; a server, if there is one, imports ``module`` once."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([module])
+    return context
+
+
+def started(
+    context: ForkServerContext | SpawnContext, work: Callable[..., None], *arguments: Any
+) -> BaseProcess:
+    """Return a process of a :func:`context_of` that does ``work`` and ends with this one."""
+    process = context.Process(target=work, args=arguments, daemon=True)
+    with same_imports(), spared():
+        process.start()
+    return process
+
+
+@contextlib.contextmanager
+def same_imports() -> Iterator[None]:
+    """Let interpreters that are started inside look for modules where this one does, nowhere else.
+
+    ``multiprocessing`` tells that to a worker, but not to the server that workers are forked from.
+    """
+    here = os.getcwd()
+    told = {"PYTHONPATH": os.pathsep.join(path or here for path in sys.path), "PYTHONSAFEPATH": "1"}
+    before = {name: os.environ.get(name) for name in told}
+    os.environ.update(told)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

@@ -10,15 +10,8 @@ from stiction_ros.pages.frame import text
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.listing.headline import kind_of
 from stiction_ros.survey.listing.saved import HEADS, change, in_words, note_of
+from stiction_ros.survey.pages import words as say
 from stiction_ros.survey.pages.trend import Earlier, Trend, trend_of, widest
-from stiction_ros.survey.pages.words import (
-    cause_words,
-    figure,
-    interval,
-    op_figure,
-    percent,
-    period,
-)
 from stiction_ros.texts import probability
 
 TEST = "worth a test"
@@ -60,35 +53,22 @@ NONE = {
 }
 """Why a cell of a loop that was judged is empty; the other cells are so without friction."""
 
-Cell = tuple[str, object]
-"""HTML, and what it is sorted by; None stands last."""
+Cell = tuple[str, object]  # HTML, and what it is sorted by; None stands last
 
 
 @dataclasses.dataclass(frozen=True)
 class Columns:
-    """Which columns a list has.
+    """Which columns a list has."""
 
-    Attributes:
-        costs, gains: whether a loop has one.
-        trends: of the loops that an earlier survey has, by name.
-        earlier: whether there was an earlier survey.
-        widest: end of the scale of the trends by unit of OP.
-    """
-
-    costs: bool
+    costs: bool  # costs, gains: whether a loop has one
     gains: bool
-    trends: Mapping[str, Trend]
-    earlier: bool
-    widest: Mapping[str, float]
+    trends: Mapping[str, Trend]  # of the loops that an earlier survey has, by name
+    earlier: bool  # whether there was an earlier survey
+    widest: Mapping[str, float]  # end of the scale of the trends by unit of OP
 
     @classmethod
     def of(cls, entries: Sequence[Entry], earlier: Sequence[Earlier]) -> Columns:
-        """Return the columns of a list.
-
-        Args:
-            entries: its rows.
-            earlier: surveys before it, the oldest first.
-        """
+        """Return the columns of a list with earlier surveys, the oldest first."""
         found = {entry.name: trend_of(entry, earlier) for entry in entries}
         trends = {name: trend for name, trend in found.items() if trend is not None}
         units = {entry.op_unit for entry in entries}
@@ -123,20 +103,20 @@ class Columns:
 
     def cells(self, entry: Entry) -> list[tuple[str, str]]:
         """Return what each column shows of a loop, and what it is sorted by."""
-        cycle, why = entry.oscillation, cause_words(entry.cause)
+        cycle, why = entry.oscillation, say.cause_words(entry.cause)
         found: list[Cell] = [
             (text(entry.rank or ""), entry.rank),
             (_name(entry), entry.name),
             (f'<span class="{kind_of(entry)}">{text(kind_of(entry))}</span>', kind_of(entry)),
             (text(why), why),
-            (percent(entry.band_share) if entry.found else "", entry.band_share),
+            (say.percent(entry.band_share) if entry.found else "", entry.band_share),
             (_friction(entry), entry.f_s if entry.found else None),
             (probability(entry.probability), entry.probability),
             _test(entry),
-            _figure(None if cycle is None else cycle.period, period),
-            _figure(None if cycle is None else cycle.amplitude, figure),
+            _figure(None if cycle is None else cycle.period, say.period),
+            _figure(None if cycle is None else cycle.amplitude, say.figure),
             *(_saved(entry, what) for what in HEADS if self.gains),
-            *([_figure(entry.cost_per_hour, figure)] if self.costs else []),
+            *([_figure(entry.cost_per_hour, say.figure)] if self.costs else []),
             *([self._trend(entry)] if self.earlier else []),
             (text(entry.group or ""), entry.group),
             (text(entry.reason), entry.reason),
@@ -166,7 +146,7 @@ def _name(entry: Entry) -> str:
 def _friction(entry: Entry) -> str:
     if not entry.found:
         return ""
-    between, shown = interval(entry.f_s_interval), op_figure(entry.f_s, entry.op_unit)
+    between, shown = say.interval(entry.f_s_interval), say.op_figure(entry.f_s, entry.op_unit)
     return f'<span title="{text(between)}">{text(shown)}</span>'
 
 
@@ -174,7 +154,7 @@ def _test(entry: Entry) -> Cell:
     if entry.test is None:
         return "", None
     time, move = entry.test["duration"], entry.test["pv_move"]
-    return text(f"{period(time)}{'' if move is None else f', PV ±{figure(move)}'}"), time
+    return text(f"{say.period(time)}{'' if move is None else f', PV ±{say.figure(move)}'}"), time
 
 
 def _saved(entry: Entry, what: str) -> Cell:

@@ -9,8 +9,7 @@ from stiction_ros.survey.pages.trend import Earlier, new_and_gone
 from stiction_ros.survey.pages.words import period
 from stiction_ros.survey.survey import Survey
 
-NAMED = 8
-"""Loops that a sentence lists."""
+NAMED = 8  # loops that a sentence lists
 
 
 def headline(survey: Survey) -> str:
@@ -34,12 +33,7 @@ def worked(survey: Survey) -> str:
 
 
 def changed(entries: Sequence[Entry], earlier: Sequence[Earlier]) -> list[str]:
-    """Return which loops are new and which are gone since the last survey, a sentence each.
-
-    Args:
-        entries: rows of now.
-        earlier: surveys, the oldest first.
-    """
+    """Return which loops are new and which are gone since the last survey, a sentence each."""
     new, gone = new_and_gone(entries, earlier)
     when = f" the survey of {earlier[-1].day}" if earlier and earlier[-1].date else " the last one"
     told = [f"New since{when}: {_listed(new)}."] if new else []

@@ -50,12 +50,7 @@ heads.forEach((head, column) => head.querySelector("button").addEventListener("c
 
 
 def list_page(survey: Survey, earlier: Sequence[Earlier] = ()) -> str:
-    """Return the page.
-
-    Args:
-        survey: what was found.
-        earlier: surveys before it, the oldest first.
-    """
+    """Return the page of a survey, with those before it, the oldest first."""
     entries = survey.entries
     first = headline(survey)
     columns = Columns.of(entries, earlier)
@@ -88,20 +83,19 @@ def _counts(entries: Sequence[Entry]) -> str:
 
 def _tools(entries: Sequence[Entry]) -> str:
     kinds = list(dict.fromkeys(kind_of(entry) for entry in entries))
-    causes = sorted({entry.cause for entry in entries if entry.cause})
+    options = [
+        f'<option value="{text(cause)}">{text(cause_words(cause))}</option>'
+        for cause in sorted({entry.cause for entry in entries if entry.cause})
+    ]
     return (
         '<div class="tools"><input id="search" type="search" placeholder="Search tags and reasons" '
         'aria-label="Search tags and reasons">'
         f'<select id="kind" aria-label="Verdict"><option value="">all verdicts</option>'
         f"{''.join(f'<option>{text(kind)}</option>' for kind in kinds)}</select>"
         f'<select id="cause" aria-label="Cause"><option value="">all causes</option>'
-        f"{''.join(_cause(cause) for cause in causes)}</select>"
+        f"{''.join(options)}</select>"
         f'<span id="shown" class="soft" role="status">{len(entries)} loops</span></div>'
     )
-
-
-def _cause(cause: str) -> str:
-    return f'<option value="{text(cause)}">{text(cause_words(cause))}</option>'
 
 
 def _table(entries: Sequence[Entry], columns: Columns) -> str:

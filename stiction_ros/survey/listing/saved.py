@@ -28,17 +28,11 @@ WHY = (
 )
 """What a note of ``gain`` says, and that in a word or two; the first that fits."""
 
-NOTHING = -0.005
-"""Change from which up another tuning is none that helps."""
+NOTHING = -0.005  # change from which up another tuning is none that helps
 
 
 def change(entry: Entry, what: str) -> float | None:
-    """Return what an option changes of the mean |PV − SP|: −.75 leaves a quarter of it.
-
-    Args:
-        entry: row of the loop.
-        what: service, embedding or retune.
-    """
+    """Return what an option changes of the mean |PV − SP|: −.75 leaves a quarter of it."""
     gain = entry.gain or {}
     before = _of(gain, "now").get("iae_per_hour")
     after = _of(gain, what).get("iae_per_hour")
@@ -48,12 +42,7 @@ def change(entry: Entry, what: str) -> float | None:
 
 
 def in_words(entry: Entry, what: str) -> str:
-    """Return the change, or why there is none; nothing for a valve that nothing is to be done of.
-
-    Args:
-        entry: row of the loop.
-        what: service, embedding or retune.
-    """
+    """Return the change, or why there is none; nothing for a valve that needs nothing."""
     if not entry.found:
         return ""
     changed, note = change(entry, what), note_of(entry, what)

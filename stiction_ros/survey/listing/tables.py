@@ -9,42 +9,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.listing.saved import HEADS, change
 from stiction_ros.survey.pages.words import cause_words
 
 Cell = str | float | int | None
 
-HEAD = (
-    "rank",
-    "loop",
-    "status",
-    "verdict",
-    "cycles by",
-    "probability",
-    "f_S",
-    "f_S low",
-    "f_S high",
-    "f_D",
-    "unit of OP",
-    "band share of OP",
-    "period s",
-    "amplitude",
-    "travel/h",
-    "reversals/h",
-    "|PV−SP| now",
-    *(f"{head} %" for head in HEADS.values()),
-    "cost per hour",
-    "group",
-    "reason",
-    "page",
-)
-
-FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
-"""What a text begins with that spreadsheets take for a formula."""
-
-STAMP = (1980, 1, 1, 0, 0, 0)
-"""Time of the files inside the XLSX: the same list is the same file."""
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # how a formula of a spreadsheet begins
+STAMP = (1980, 1, 1, 0, 0, 0)  # time of the files inside the XLSX: the same list is the same file
 
 _TYPES = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
@@ -84,39 +56,41 @@ state="frozen"/></sheetView></sheetViews>
 <sheetData>{rows}</sheetData><autoFilter ref="A1:{last}"/></worksheet>"""
 
 
-def cells(entry: Entry) -> list[Cell]:
-    """Return the row of a loop under :data:`HEAD`; no text in it is a formula to a spreadsheet."""
+def row_of(entry: Entry) -> dict[str, Cell]:
+    """Return heading to cell of a loop; no text in it is a formula to a spreadsheet."""
     cycle, gain = entry.oscillation, entry.gain or {}
     low, high = entry.f_s_interval or (None, None)
-
     now = (gain.get("now") or {}).get("iae_per_hour")
-    changes = [change(entry, what) for what in HEADS]
-    found: list[Cell] = [
-        entry.rank,
-        entry.name,
-        entry.status.value,
-        entry.verdict,
-        cause_words(entry.cause) or None,
-        entry.probability,
-        entry.f_s,
-        low,
-        high,
-        entry.f_d,
-        None if entry.f_s is None else entry.op_unit,
-        entry.band_share,
-        None if cycle is None else cycle.period,
-        None if cycle is None else cycle.amplitude,
-        entry.travel_per_hour,
-        entry.reversals_per_hour,
-        None if now is None else float(now),
-        *(None if one is None else 100.0 * one for one in changes),
-        entry.cost_per_hour,
-        entry.group,
-        entry.reason or None,
-        entry.report,
-    ]
-    texts = [isinstance(cell, str) and cell.startswith(FORMULA) for cell in found]
-    return [f"'{cell}" if text else cell for cell, text in zip(found, texts, strict=True)]
+    changes = {f"{head} %": change(entry, what) for what, head in HEADS.items()}
+    found: dict[str, Cell] = {
+        "rank": entry.rank,
+        "loop": entry.name,
+        "status": entry.status.value,
+        "verdict": entry.verdict,
+        "cycles by": cause_words(entry.cause) or None,
+        "probability": entry.probability,
+        "f_S": entry.f_s,
+        "f_S low": low,
+        "f_S high": high,
+        "f_D": entry.f_d,
+        "unit of OP": None if entry.f_s is None else entry.op_unit,
+        "band share of OP": entry.band_share,
+        "period s": None if cycle is None else cycle.period,
+        "amplitude": None if cycle is None else cycle.amplitude,
+        "travel/h": entry.travel_per_hour,
+        "reversals/h": entry.reversals_per_hour,
+        "|PV−SP| now": None if now is None else float(now),
+        **{head: None if one is None else 100.0 * one for head, one in changes.items()},
+        "cost per hour": entry.cost_per_hour,
+        "group": entry.group,
+        "reason": entry.reason or None,
+        "page": entry.report,
+    }
+    texts = {k for k, cell in found.items() if isinstance(cell, str) and cell.startswith(FORMULA)}
+    return {head: f"'{cell}" if head in texts else cell for head, cell in found.items()}
+
+
+HEAD = tuple(row_of(Entry("", (), Status.OK)))
 
 
 def write_csv(path: Path, entries: Sequence[Entry]) -> None:
@@ -125,13 +99,13 @@ def write_csv(path: Path, entries: Sequence[Entry]) -> None:
     writer = csv.writer(text, lineterminator="\r\n")
     writer.writerow(HEAD)
     for entry in entries:
-        writer.writerow(["" if cell is None else _short(cell) for cell in cells(entry)])
+        writer.writerow([_short(cell) for cell in row_of(entry).values()])
     path.write_text(text.getvalue(), encoding="utf-8-sig", newline="")
 
 
 def write_xlsx(path: Path, entries: Sequence[Entry]) -> None:
     """Write the list as a workbook of one sheet (ECMA-376), its head frozen and with filters."""
-    table: list[list[Cell]] = [list(HEAD), *[cells(entry) for entry in entries]]
+    table: list[list[Cell]] = [list(HEAD), *[list(row_of(entry).values()) for entry in entries]]
     rows = "".join(_row(number, row) for number, row in enumerate(table, start=1))
     sheet = _SHEET.format(rows=rows, last=f"{_column(len(HEAD))}{len(table)}")
     parts = {
@@ -169,5 +143,5 @@ def _column(number: int) -> str:
     return letters
 
 
-def _short(value: Cell) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+def _short(value: Cell | None) -> str:
+    return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)

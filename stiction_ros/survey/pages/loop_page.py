@@ -13,16 +13,8 @@ from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.pages.signals import Units, all_signals, close_look
 from stiction_ros.records.record import Record
 from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.pages import words as say
 from stiction_ros.survey.pages.trend import PLACE
-from stiction_ros.survey.pages.words import (
-    PERCENT,
-    cause_words,
-    figure,
-    in_op_unit,
-    interval,
-    percent,
-    period,
-)
 from stiction_ros.texts import probability
 
 HEADLINES = {
@@ -40,8 +32,7 @@ OPTIONS = {
 }
 
 LIST = "../survey.html"
-NO_UNIT = "PV units"
-"""What stands where no unit was given."""
+NO_UNIT = "PV units"  # what stands where no unit was given
 
 
 def loop_page(
@@ -51,30 +42,22 @@ def loop_page(
     gain: Mapping[str, Any] | None,
     unit: str = "",
 ) -> str:
-    """Return the page.
-
-    Args:
-        entry: row of the loop.
-        record: part that was looked at.
-        found: what identification made of it.
-        gain: mapping of ``gain --json``, None where it was not simulated.
-        unit: of PV; empty where none was given.
-    """
+    """Return the page of a loop; ``gain`` is that of ``gain --json``, ``unit`` that of PV."""
     unit = text(unit or NO_UNIT)
     headline = HEADLINES.get(entry.verdict or "", "Not judged")
-    op_unit = "% of travel" if entry.op_unit == PERCENT else "OP's own unit"
+    op_unit = "% of travel" if entry.op_unit == say.PERCENT else "OP's own unit"
     cycle = entry.oscillation
     cards = [
-        card(words(f"friction f_S, {op_unit}"), figure(entry.f_s) or "–"),
-        card("f<sub>S</sub> lies between", interval(entry.f_s_interval) or "–"),
-        card(words(f"sliding friction f_D, {op_unit}"), figure(entry.f_d) or "–"),
-        card("share of OP's movement lost to it", percent(entry.band_share) or "–"),
+        card(words(f"friction f_S, {op_unit}"), say.figure(entry.f_s) or "–"),
+        card("f<sub>S</sub> lies between", say.interval(entry.f_s_interval) or "–"),
+        card(words(f"sliding friction f_D, {op_unit}"), say.figure(entry.f_d) or "–"),
+        card("share of OP's movement lost to it", say.percent(entry.band_share) or "–"),
         card("probability of friction", probability(entry.probability) or "–"),
-        card("the loop cycles by", text(cause_words(entry.cause or "none"))),
+        card("the loop cycles by", text(say.cause_words(entry.cause or "none"))),
     ]
     if cycle is not None and cycle.period is not None:
-        cards.append(card("period of the cycle", period(cycle.period)))
-        cards.append(card("amplitude of the cycle", f"{figure(cycle.amplitude)} {unit}"))
+        cards.append(card("period of the cycle", say.period(cycle.period)))
+        cards.append(card("amplitude of the cycle", f"{say.figure(cycle.amplitude)} {unit}"))
     known = found.stem.shape == record.op.shape
     units = Units(unit, text(op_unit))
     sentence = next((o.cause.sentence for o in found.outputs if o.cause is not None), "")
@@ -101,7 +84,7 @@ def _answers(found: Identification, op_unit: str) -> list[str]:
     told = []
     for j, valve in enumerate(found.valves):
         said = (why(found, j), materiality(valve), f"Next: {next_step(found, j)}")
-        told.append(in_op_unit(" ".join(filter(None, said)), op_unit))
+        told.append(say.in_op_unit(" ".join(filter(None, said)), op_unit))
     return told
 
 
@@ -118,7 +101,7 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str, op_unit: str) -> str:
     rows = [_gain_row("now", gain["now"], head, keys, "")]
     for option in gain["options"]:
         ends = option["interval"].get("iae_per_hour")
-        between = f" Mean |PV−SP| {interval((ends[0], ends[1]))}." if ends else ""
+        between = f" Mean |PV−SP| {say.interval((ends[0], ends[1]))}." if ends else ""
         name = OPTIONS[option["what"]]
         rows.append(_gain_row(name, option, head, keys, option["note"] + between))
     titles = "".join(f"<th scope='col'>{text(title)}</th>" for title in head)
@@ -134,7 +117,7 @@ def _gain_row(
     name: str, measures: Mapping[str, Any], head: Sequence[str], keys: Sequence[str], note: str
 ) -> str:
     cells = "".join(
-        f"<td data-label='{text(label)}'>{figure(measures[key]) or '–'}</td>"
+        f"<td data-label='{text(label)}'>{say.figure(measures[key]) or '–'}</td>"
         for label, key in zip(head[1:], keys, strict=False)
     )
     return (
@@ -144,10 +127,9 @@ def _gain_row(
 
 
 def _span(record: Record) -> str:
-    seconds = len(record) * record.sample_time
+    whole = say.period(len(record) * record.sample_time)
     return (
-        f"{len(record)} samples of {record.sample_time:g} s, {period(seconds)} of operation, were "
-        "looked at."
+        f"{len(record)} samples of {record.sample_time:g} s, {whole} of operation, were looked at."
     )
 
 

@@ -10,18 +10,12 @@ from stiction_ros.pages.plot import spark
 from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.pages.words import figure, op_figure
 
-PLACE = "<!-- trend --><!-- /trend -->"
-"""Where a page says how its loop did in earlier surveys, which no worker knows."""
+PLACE = "<!-- trend --><!-- /trend -->"  # for what no worker knows
 
 
 @dataclasses.dataclass(frozen=True)
 class Earlier:
-    """An earlier survey.
-
-    Attributes:
-        date: when it was done, ISO; empty when it does not say.
-        bands: f_S + f_D of its loops in the unit of OP; None where it has none.
-    """
+    """An earlier survey: its date, ISO or empty, and f_S + f_D of its loops in the unit of OP."""
 
     date: str
     bands: Mapping[str, float | None]
@@ -61,12 +55,7 @@ class Trend:
 
 
 def trend_of(entry: Entry, earlier: Sequence[Earlier]) -> Trend | None:
-    """Return the trend of a loop; None where no earlier survey has its band.
-
-    Args:
-        entry: row of the loop now.
-        earlier: surveys, the oldest first.
-    """
+    """Return the trend of a loop; None where no earlier survey, the oldest first, has its band."""
     steps = [(one.day, band) for one in earlier if (band := one.bands.get(entry.name)) is not None]
     if not steps:
         return None
@@ -84,12 +73,7 @@ def widest(trends: Iterable[Trend | None], op_unit: str) -> float:
 def new_and_gone(
     entries: Iterable[Entry], earlier: Sequence[Earlier]
 ) -> tuple[list[str], list[str]]:
-    """Return the loops that the last survey did not have, and those that are no longer there.
-
-    Args:
-        entries: rows of now.
-        earlier: surveys, the oldest first.
-    """
+    """Return the loops that the last survey did not have, and those that are no longer there."""
     if not earlier:
         return [], []
     now, before = {entry.name for entry in entries}, set(earlier[-1].bands)
@@ -97,13 +81,7 @@ def new_and_gone(
 
 
 def with_trend(page: str, trend: Trend, most: float) -> str:
-    """Return a page with a trend in it, whether there was one or not.
-
-    Args:
-        page: HTML of a loop.
-        trend: of it.
-        most: end of the scale.
-    """
+    """Return a page with a trend in it, up to ``most``, whether there was one or not."""
     begin, end = PLACE.split("><")
     begin, end = f"{begin}>", f"<{end}"
     before, found, rest = page.partition(begin)

@@ -15,8 +15,7 @@ CAUSES = {
 }
 """Cause of a cycle as people read it, wherever they do."""
 
-PERCENT = "%"
-"""Unit of an OP that is known; another one is the loop's own and has no name."""
+PERCENT = "%"  # unit of an OP that is known; another one is the loop's own and has no name
 
 
 def figure(value: float | None, digits: int = 3) -> str:
@@ -40,23 +39,13 @@ def signed_percent(change: float) -> str:
 
 
 def op_figure(value: float | None, op_unit: str) -> str:
-    """Return a figure with the unit of OP behind it; nothing where there is none.
-
-    Args:
-        value: in the unit of OP.
-        op_unit: %, or the loop's own.
-    """
+    """Return a figure with the unit of OP behind it; nothing where there is none."""
     shown = figure(value)
     return shown and f"{shown} {'%' if op_unit == PERCENT else 'units'}"
 
 
 def in_op_unit(sentence: str, op_unit: str) -> str:
-    """Return a sentence whose % of OP are units where OP has its own; shares ``% of`` stay.
-
-    Args:
-        sentence: as identification says it.
-        op_unit: %, or the loop's own.
-    """
+    """Return a sentence whose % of OP are units where OP has its own; shares ``% of`` stay."""
     return sentence if op_unit == PERCENT else re.sub(r"(\d) %(?! of\b)", r"\1 units", sentence)
 
 

@@ -321,7 +321,7 @@ def test_of_several_loops_one_is_chosen_by_its_namespace(bag: Path, tmp_path: Pa
                     topic = dataclasses.replace(raw.topic, name=space + raw.topic.name)
                     writer.add_topic(topic.name, topic.type, topic.definition, topic.type_hash)
                     writer.write(topic.name, raw.data, raw.log_time, raw.publish_time)
-    with pytest.raises(InputError, match=r"holds 2 loops \(/one, /two\); choose one by --names"):
+    with pytest.raises(InputError, match=r"holds 2 loops \(/one, /two\); choose one with --names"):
         read_replay_bag(path)
     with pytest.raises(InputError, match="no loop in the namespace three; its loops are /one, /t"):
         read_replay_bag(path, namespace="three")

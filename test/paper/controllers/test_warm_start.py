@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from paper_cases import STICKY
 
 from stiction_ros.effects import HeStiction
-from stiction_ros.paper.controllers.warm_start import compensation
+from stiction_ros.paper.controllers.embedding import compensation
 
 POSITIONS = st.floats(20.0, 80.0)
 

@@ -18,8 +18,7 @@ from stiction_ros.discrepancy import (
 )
 from stiction_ros.effects import from_mapping
 from stiction_ros.loop import LoopModel, SetPoints, simulate
-from stiction_ros.report.gap.effects import WINDOW, _liveliest
-from stiction_ros.report.gap.report import report_gap
+from stiction_ros.report.gap.report import WINDOW, _liveliest, report_gap
 from stiction_ros.report.gap.words import figures_with_units
 
 

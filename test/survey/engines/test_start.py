@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from stiction_ros.survey.engines.start import same_imports
+from stiction_ros.survey.engines.local import same_imports
 
 HERE = Path(__file__).parent
 

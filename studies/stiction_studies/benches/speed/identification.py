@@ -13,10 +13,9 @@ import numpy as np
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, Identification, IdentificationOptions, identify
-from stiction_ros.paper.equation_error import fit_outputs
 from stiction_ros.paper.grid_search import count_points
 from stiction_ros.paper.methods import identify as identify_as_paper
-from stiction_ros.paper.one_step_result import check_record, friction_limits
+from stiction_ros.paper.one_step_result import check_record, fit_outputs, friction_limits
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification
 from stiction_ros.paper.smoothed_laws import smooth_law

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.paper.equation_error import fit_outputs
-from stiction_ros.paper.one_step_result import check_record, friction_limits
+from stiction_ros.paper.one_step_result import check_record, fit_outputs, friction_limits
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme
 from stiction_ros.paper.programme.nlp import WIDTH
