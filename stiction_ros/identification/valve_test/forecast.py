@@ -26,18 +26,22 @@ class Forecast:
 
     Attributes:
         pv: of an ideal valve and under each friction, shape (1 + G, J).
-        alike: the same from now on, by one gain and one process for all, which tells stems apart.
+        alike: the same from now on, by one process for all, which tells stems apart.
         weights: how likely each is, shape (1 + G,).
+        counts: the same of each friction of interest, 0 of others, shape (G,).
         spread: standard deviation of what is left open of each: where PV is, how the load walks,
             how the gain changes with the opening, shape (J,).
         noise: the same of the mean of PV over each hold, shape (J,).
+        known: precision of the gain, over its square, by the test so far.
     """
 
     pv: FloatArray
     alike: FloatArray
     weights: FloatArray
+    counts: FloatArray
     spread: FloatArray
     noise: FloatArray
+    known: float
 
     @classmethod
     def of(cls, judgement: Judgement, levels: Sequence[float]) -> Forecast:
@@ -47,33 +51,32 @@ class Forecast:
             judgement: of the test so far.
             levels: OP after each further move, %, shape (J,).
         """
-        trial, friction = judgement.trial, judgement.probability
-        hold, count = round(trial.hold), len(trial.pv)
-        best, shape = judgement.sticky, Shape.of(judgement.sticky.dynamics, trial.hold)
-        rows = np.append(trial.steps.rows, count + hold * np.arange(len(levels)))
-        lead = np.asarray(levels) - trial.steps.levels[0]
+        trial, ideal, sticky = judgement.trial, judgement.ideal, judgement.sticky
+        hold, count, ahead = round(trial.hold), len(trial.pv), len(levels)
+        shape = Shape.of(sticky.dynamics, trial.hold)
+        rows = np.append(trial.steps.rows, count + hold * np.arange(ahead))
         path = np.append(trial.steps.levels, levels)
-        ends = hold * np.arange(1, len(levels) + 1)
+        ends = hold * np.arange(1, ahead + 1)
         cells = judgement.frictions.along(Steps(rows, path, count + int(ends[-1])))
-        ideal, sticky = (
-            _to_come(judgement.ideal, trial, rows, ends),
-            _to_come(best, trial, rows, ends),
-        )
-        stems = np.vstack([np.diff(path), cells.moves[cells.which]])
-        pv = stems @ sticky
-        gain = judgement.gain / max(float(shape.shown(trial.hold)), UNSHOWN)
-        alike = gain * pv
-        pv[0] = judgement.ideal.gains[0] * (stems[0] @ ideal)
-        pv[1:] *= best.gains[judgement.frictions.which][:, None]
+        to_come = _to_come(sticky, trial, rows, ends)
+        pv = np.vstack([np.diff(path), cells.moves[cells.which]]) @ to_come
+        pv[1:] *= sticky.gains[judgement.frictions.which][:, None]
+        alike = pv.copy()
+        alike[0] *= ideal.shown(trial.hold)[0] / max(float(shape.shown(trial.hold)), UNSHOWN)
+        pv[0] = ideal.gains[0] * (np.diff(path) @ _to_come(ideal, trial, rows, ends))
         recent = trial.pv[trial.seen][-max(hold // 4, 1) :]
+        lead = path[1:] - path[0]
         own = judgement.gain**2 * (OWN_ERROR**2 + (CURVATURE * lead**2) ** 2)
+        noise = np.sqrt(sticky.noise**2 * shape.unsure(trial.hold) + own)
         walked = shape.load * (ends + shape.dead) + 1.0 / len(recent)
         return cls(
             recent.mean() + pv,
             alike,
-            np.append(1.0 - friction, friction * best.cells(judgement.frictions)),
-            np.sqrt(best.noise**2 * walked + own),
-            np.sqrt(best.noise**2 * shape.unsure(trial.hold) + own),
+            np.append(1.0 - judgement.weights.sum(), judgement.weights),
+            judgement.weights * judgement.counts,
+            np.sqrt(sticky.noise**2 * walked + own[-ahead:]),
+            noise[-ahead:],
+            KNOWN**-2 + float(((judgement.gain * lead / noise)[:-ahead] ** 2).sum()),
         )
 
     def beyond(self, low: float, high: float) -> float:
@@ -88,11 +91,11 @@ class Forecast:
         """
         middle, frictions = self.alike[0], self.alike[1:]
         if sizing:
-            middle = self.weights[1:] @ frictions / self.weights[1:].sum()
+            middle = self.counts @ frictions / self.counts.sum()
         apart, straight = (frictions - middle) / self.noise, self.alike[0] / self.noise
         energy = (apart**2).sum(axis=1)
-        energy -= (apart @ straight) ** 2 / (KNOWN**-2 + straight @ straight)  # another gain
-        return float(self.weights[1:] @ -np.expm1(-energy / 8.0))
+        energy -= (apart @ straight) ** 2 / (self.known + straight @ straight)  # another gain
+        return float(self.counts @ -np.expm1(-energy / 8.0))
 
 
 def _to_come(explanation: Explanation, trial: Trial, rows: IntArray, ends: IntArray) -> FloatArray:

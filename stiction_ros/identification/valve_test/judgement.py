@@ -12,7 +12,7 @@ from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.identification.evidence.sensor_hold import held_rows
 from stiction_ros.identification.result.identification import VerdictKind
 from stiction_ros.identification.valve_test.frictions import SMALLEST, Frictions
-from stiction_ros.identification.valve_test.likelihood import OWN_ERROR, Shape, log_sum
+from stiction_ros.identification.valve_test.likelihood import OWN_ERROR, log_sum
 from stiction_ros.identification.valve_test.search import Explanation, Trial
 from stiction_ros.identification.valve_test.steps import SHORTEST, Steps
 
@@ -33,11 +33,14 @@ class Judgement:
 
     Attributes:
         verdict: sticky, backlash, healthy or undecided.
-        probability: of friction of :data:`SMALLEST` or more.
+        probability: of friction of interest: of :data:`SMALLEST` or more, and such that a slip of
+            f_S moves PV by more than its noise, which hides the cycles of less.
         f_s, f_d: median, %; 0 for a valve without friction.
         f_s_interval, f_d_interval: 95 % of what is possible, %.
         responded: whether PV surely answered OP at all.
         moves_seen: steps of OP in the record.
+        weights: how likely each friction is, shape (G,).
+        counts: whether it is of interest, shape (G,).
         trial, ideal, sticky, frictions: what it was read from.
     """
 
@@ -49,6 +52,8 @@ class Judgement:
     f_d_interval: tuple[float, float]
     responded: bool
     moves_seen: int
+    weights: FloatArray
+    counts: BoolArray
     trial: Trial
     ideal: Explanation
     sticky: Explanation
@@ -76,10 +81,8 @@ class Judgement:
         """What 1 % of the stem makes of PV within a hold by the likelier explanation."""
         best, row = self.ideal, 0
         if self.probability > 0.5:
-            best = self.sticky
-            row = int(self.frictions.which[np.argmax(best.cells(self.frictions))])
-        shape = Shape.of(best.dynamics, self.trial.hold)
-        return float(best.gains[row] * shape.shown(self.trial.hold))
+            best, row = self.sticky, int(self.frictions.which[np.argmax(self.weights)])
+        return float(best.shown(self.trial.hold)[row])
 
     @property
     def sentence(self) -> str:
@@ -89,7 +92,7 @@ class Judgement:
         if self.verdict is VerdictKind.HEALTHY:
             return (
                 f"Healthy, with probability {sure}: the stem follows OP, without friction of "
-                f"{SMALLEST:g} % or more."
+                f"{high:.2g} % or more."
             )
         if not self.decided:
             reach = float(np.ptp(self.trial.steps.levels))
@@ -146,13 +149,17 @@ def judged(op: FloatArray, pv: FloatArray, gain: float | None = None) -> Judgeme
     share = 0.5 * (1.0 - NO_LINK)
     logs = np.array([ideal.evidence, sticky.evidence, still.evidence])
     logs += np.log([share, share, NO_LINK])
-    ideal_share, friction, no_link = np.exp(logs - log_sum(logs)).tolist()
+    _, friction, no_link = np.exp(logs - log_sum(logs)).tolist()
     cells = sticky.cells(frictions)
-    moved = 1.0 - no_link - friction * float(cells[~frictions.moved].sum())
+    weights = friction * cells
+    hidden = sticky.hidden(trial.hold)[frictions.which]
+    counts = ~frictions.moved | (frictions.static >= hidden)
+    probability = float(weights[counts].sum())
+    moved = 1.0 - no_link - float(weights[~frictions.moved].sum())
     verdict = VerdictKind.UNDECIDED
-    if ideal_share >= DECIDED:
+    if 1.0 - no_link - probability >= DECIDED:
         verdict = VerdictKind.HEALTHY
-    elif friction >= DECIDED:
+    elif probability >= DECIDED:
         even = float(cells[frictions.even].sum())
         verdict = VerdictKind.BACKLASH if even >= DECIDED else VerdictKind.STICKY
     static = _spread(frictions.static, cells, frictions.even)
@@ -161,18 +168,20 @@ def judged(op: FloatArray, pv: FloatArray, gain: float | None = None) -> Judgeme
     own = 2.0 * OWN_ERROR  # two standard deviations of what the law leaves out
     static = max(min(static[0], low) - own, 0.0), static[1], max(static[2], high) + own
     if verdict is VerdictKind.HEALTHY:
-        static = dynamic = (0.0, 0.0, SMALLEST)
+        static = dynamic = (0.0, 0.0, max(SMALLEST, float(ideal.hidden(trial.hold)[0])))
     elif verdict is VerdictKind.UNDECIDED:
         static, dynamic = (0.0, *static[1:]), (0.0, *dynamic[1:])
     return Judgement(
         verdict,
-        friction,
+        probability,
         static[1],
         (static[0], static[2]),
         dynamic[1],
         (dynamic[0], dynamic[2]),
         moved >= DECIDED,
         len(trial.steps.rows),
+        weights,
+        counts,
         trial,
         ideal,
         sticky,

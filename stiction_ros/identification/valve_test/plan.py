@@ -19,8 +19,7 @@ WIDENS = 2.5
 """Times by which a pair is wider than the one before: five go from the smallest friction of
 interest to the largest."""
 SIZES = 12  # of pairs that a further round is chosen from
-PAIRS, LOOKS = 3, 2  # pairs of a round, and those of which PV is forecast when it begins
-ROUNDS = 3
+PAIRS, ROUNDS = 3, 3  # pairs of a round, and rounds
 
 
 @dataclasses.dataclass(frozen=True)
@@ -115,20 +114,20 @@ class Plan:
 def first_round(facts: Facts) -> Plan:
     """Return the first round: the smallest pairs whose answer PV's noise does not hide."""
     seen = 0.5 * CLEAR * facts.noise / abs(facts.gain) if facts.gain else 0.0
-    return _round(facts, max(SMALLEST, seen))
+    return _round(facts, max(SMALLEST, seen), PAIRS)
 
 
-def further_round(facts: Facts, judgement: Judgement, sizing: bool = False) -> Plan | None:
+def further_round(facts: Facts, judgement: Judgement, pairs: int = PAIRS) -> Plan | None:
     """Return the next round: the pairs that tell most, or wider ones where PV did not answer.
 
-    The first pairs of a round keep PV within its limits with probability :data:`DECIDED`, by all
-    that the test leaves possible; of rounds that tell as much it is the smallest.
+    The round keeps PV within its limits with probability :data:`DECIDED`, by all that the test
+    leaves possible; of rounds that tell as much it is the smallest. Where friction is sure to be
+    there, it is to tell its size.
 
     Args:
         facts: of the loop.
         judgement: of the rounds before.
-        sizing: whether friction is known to be there, and only its size is asked for, by the
-            fewest moves: a pair at a time.
+        pairs: of moves.
 
     Returns:
         None where the limits leave no such round.
@@ -141,11 +140,11 @@ def further_round(facts: Facts, judgement: Judgement, sizing: bool = False) -> P
         reaches = np.geomspace(WIDENS, 1.0, SIZES, endpoint=False) * reach
     told: dict[float, Plan] = {}
     for least in np.minimum(reaches, most).tolist():
-        plan = _round(facts, least, 1 if sizing else PAIRS)
-        if plan.levels and stays(facts, judgement, plan.levels[: 2 * LOOKS]):
+        plan = _round(facts, least, pairs)
+        if stays(facts, judgement, plan.levels[:-1]):
             value = _first(plan)
             if judgement.responded:
-                value = Forecast.of(judgement, plan.levels[:-1]).apart(sizing)
+                value = Forecast.of(judgement, plan.levels[:-1]).apart(judgement.sure)
             told[value] = plan
     enough = DECIDED * max(told, default=0.0)
     best = min((plan for value, plan in told.items() if value >= enough), key=_first, default=None)
@@ -167,7 +166,7 @@ def _first(plan: Plan) -> float:
     return plan.levels[0] - plan.facts.op
 
 
-def _round(facts: Facts, least: float, pairs: int = PAIRS) -> Plan:
+def _round(facts: Facts, least: float, pairs: int) -> Plan:
     """Return pairs of moves up and down, which leave a level where it was."""
     reaches = sorted({min(least * WIDENS**k, facts.widest) for k in range(pairs)})
     levels = [facts.op + sign * reach for reach in reaches for sign in (1.0, -1.0)]

@@ -54,6 +54,15 @@ class Explanation:
     gains: FloatArray
     noise: float
 
+    def shown(self, hold: float) -> FloatArray:
+        """Return what 1 % of the stem makes of PV within a hold of some samples, shape (U,)."""
+        return self.gains * Shape.of(self.dynamics, hold).shown(hold)
+
+    def hidden(self, hold: float) -> FloatArray:
+        """Return the move of the stem that makes as much of PV as its noise, %, shape (U,)."""
+        noise = self.noise * math.sqrt(1.0 + Shape.of(self.dynamics, hold).noise[1])
+        return noise / np.maximum(np.abs(self.shown(hold)), 1e-300)
+
     def cells(self, frictions: Frictions) -> FloatArray:
         """Return how likely each cell is, shape (G,)."""
         return np.asarray(np.exp(self.values[frictions.which] + frictions.logs - self.evidence))

@@ -15,8 +15,11 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.online.controller.live import LiveController, ModeChange
 from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.handover.background import Background
+from stiction_ros.processes import LinearModel
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+
     from stiction_ros.online.controller.valve_test import ValveTest
 
 LONGEST = 5000  # samples of the step response that are looked at
@@ -44,8 +47,9 @@ class ValveTestingController(LiveController):
         super().__init__(settings, model, background)
         self.test: ValveTest | None = None
         self.tested: ModeChange | None = None
-        self._wanted = settings.mode == ControlMode.VALVE_TEST
+        self._answers: Future[FloatArray]
         self._sp, self._valve, self._output = np.empty(0), 0, 0
+        self._want()
 
     @property
     def mode(self) -> ControlMode:
@@ -60,6 +64,12 @@ class ValveTestingController(LiveController):
     def _ours(self) -> bool:
         return self._told is None or self._told.ours
 
+    def _want(self) -> None:
+        """Make ready for a test, where the settings ask for one: it begins when that is done."""
+        self._wanted = self.settings.mode == ControlMode.VALVE_TEST
+        if self._wanted:
+            self._answers = self._background.submit(_answers, self._design.model)
+
     def begin(self, op: FloatArray) -> None:
         self._stop("a run began")
         super().begin(op)
@@ -68,7 +78,7 @@ class ValveTestingController(LiveController):
         before = self.settings.mode
         super().retune(settings)
         if settings.mode != before:
-            self._wanted = settings.mode == ControlMode.VALVE_TEST
+            self._want()
             self._stop("the mode was set")
 
     def pass_over(self, pv: FloatArray, dv: FloatArray | None = None) -> None:
@@ -82,7 +92,8 @@ class ValveTestingController(LiveController):
         dv: FloatArray | None = None,
         preview: FloatArray | None = None,
     ) -> StepResult:
-        if self._wanted and self._sample >= self.settings.valve_test_at and self._ours:
+        due = self._wanted and self._sample >= self.settings.valve_test_at and self._ours
+        if due and self._answers.done():
             self._wanted = False
             self._begin_test(pv, sp)
         test = self._running
@@ -115,11 +126,10 @@ class ValveTestingController(LiveController):
                 self._note(f"no valve test: the loop has no {tag}", self._sample)
                 return
         self._valve = names.index(name) if name else 0
-        # Judging takes compiled code, which a controller that tests nothing does not wait for.
         from stiction_ros.identification.valve_test.facts import facts_of_answer
         from stiction_ros.online.controller.valve_test import ValveTest
 
-        step, values = self.model.sample_time, self._design.model.step_responses(LONGEST)
+        step, values = self.model.sample_time, self._answers.result()
         noise = self._noise()
         clear = np.abs(values[:, :, self._valve]).max(axis=0) / np.maximum(noise, 1e-300)
         out = self.model.outputs.index(shows) if shows else int(np.argmax(clear))
@@ -180,3 +190,13 @@ class ValveTestingController(LiveController):
         }
         model = dataclasses.replace(model, provenance=(*model.provenance, told))
         self.offer(model, self._sample + 1)
+
+
+def _answers(model: LinearModel) -> FloatArray:
+    """Return the answers to steps; import what judges a test, whose compiled code takes a second.
+
+    A controller that tests nothing does not wait for it, and one that does is not late.
+    """
+    import stiction_ros.online.controller.valve_test  # noqa: F401
+
+    return model.step_responses(LONGEST)

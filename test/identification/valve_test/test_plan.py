@@ -70,10 +70,10 @@ def test_where_pv_does_not_answer_the_pairs_widen_until_the_limits_end_the_test(
 
 
 def test_a_further_round_keeps_pv_within_its_limits(answered: Judgement) -> None:
-    free = further_round(FACTS, answered, sizing=True)
+    free = further_round(FACTS, answered, 1)
     assert free is not None
     close = dataclasses.replace(FACTS, pv_limit=(98.5, 101.5))
-    bound = further_round(close, answered, sizing=True)
+    bound = further_round(close, answered, 1)
     assert bound is None or bound.reach <= min(free.reach, 4.0)
 
 

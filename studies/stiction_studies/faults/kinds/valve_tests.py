@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 from stiction_studies.faults.fault import Fault
 from stiction_studies.faults.kinds.lost_signals import NAN, relayed
@@ -55,6 +56,13 @@ def _set(loop: RunningLoop, mode: str) -> None:
         loop.remark(f"the controller did not take mode {mode}")
 
 
+def by_another(message: Any) -> list[Any]:
+    """Let an OP in force be that of someone else."""
+    message.header.frame_id = "/operator"
+    message.position = moved(list(message.position))
+    return [message]
+
+
 def moved(row: list[float]) -> list[float]:
     """Return the values beside where they were."""
     return [value + AWAY for value in row]
@@ -86,7 +94,7 @@ FAULTS = (
         "test-taken-over",
         "an OP in force that is not the controller's ends a valve test, and the control goes on "
         "from that OP",
-        in_a_test(relayed("op_applied", lambda: instead(moved, 3), seconds=1.0)),
+        in_a_test(relayed("op_applied", lambda: by_another, samples=3)),
         relayed=("op_applied",),
     ),
     Fault(
