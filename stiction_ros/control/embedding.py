@@ -200,7 +200,7 @@ class EmbeddingMpc(Formulation):
                     kick = min(kick, float(tuning.kick_limits[j]))
                 if np.isfinite(kick):
                     # OP leads the stem by f_D, and a jump back takes that twice.
-                    way = kick - 2.0 * self._room[j]
+                    way = form.strokes * kick - 2.0 * self._room[j]
                     self._largest[j] = max(form.overshoot * way, self._least[j])
         travel = self.limits.stem[:, 1] - self.limits.stem[:, 0] - self._room
         self.immobile = tuple(j for j in self._sticky if self._least[j] > travel[j])
