@@ -294,8 +294,8 @@ class MpcController:
         """Return the OP (m,), %, of this sample; a slip that takes several ends as it began."""
         op = np.array(proposal.op)
         for j, belief in self.valves.sticky if proposal.plan is not None else ():
-            way = self._ways[j] or belief.form.way(float(applied[j]), belief.stem, float(op[j]))
-            op[j], *self._ways[j] = way
+            at = float(applied[j]), belief.stem, float(op[j])
+            op[j], *self._ways[j] = belief.form.way(*at, self._ways[j])
         return op
 
     def _valid(self, op: FloatArray, otherwise: FloatArray) -> FloatArray:

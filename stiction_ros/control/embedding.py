@@ -31,19 +31,24 @@ WAITS = (1,)
 WAITING_SECONDS = (0, 1)
 
 
-def patterns(sticky: int) -> tuple[JumpPattern, ...]:
+def patterns(sticky: int, strokes: int = 1) -> tuple[JumpPattern, ...]:
     """Return the patterns of each of ``sticky`` valves: stay, ± one jump, ± two jumps.
 
     A single valve may also wait a sample first: without that a jump that is better later
     would be made now, since staying for good is the only other choice.
+
+    A stem that slips at the last of several strokes jumps so much later, and after the rest
+    behind a jump as much later again.
     """
-    found = [JumpPattern(0)]
-    for direction in (1, -1):
-        found.append(JumpPattern(direction))
-        found.extend(JumpPattern(direction, second) for second in SECOND_JUMPS[sticky])
-        if sticky == 1:
-            found.extend(JumpPattern(direction, s, w) for w in WAITS for s in WAITING_SECONDS)
-    return tuple(found)
+    late = strokes - 1
+    choices = [(0, second) for second in (0, *SECOND_JUMPS[sticky])]
+    if sticky == 1:
+        choices += [(wait, second) for wait in WAITS for second in WAITING_SECONDS]
+    return JumpPattern(0), *(
+        JumpPattern(direction, second and second + 2 * late, wait + late)
+        for direction in (1, -1)
+        for wait, second in choices
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,8 +114,10 @@ class EmbeddingMpc(Formulation):
         self.know([None if f is None else jump_form(f) for f in frictions], spreads)
         priced = self._priced(weights)
         self.cost, self.move_weights = HorizonCost(model, priced), priced.move
-        one = patterns(len(self._sticky))
-        choices = [one if f is not None else (None,) for f in frictions]
+        choices = [
+            (None,) if form is None else patterns(len(self._sticky), form.strokes)
+            for form in self.forms
+        ]
         combinations = tuple(
             combination
             for combination in itertools.product(*choices)
@@ -168,7 +175,7 @@ class EmbeddingMpc(Formulation):
                     kick = min(kick, float(tuning.kick_limits[j]))
                 if np.isfinite(kick):
                     # OP leads the stem by f_D, and a jump back takes that twice.
-                    way = kick - 2.0 * self._room[j]
+                    way = form.strokes * kick - 2.0 * self._room[j]
                     self._largest[j] = max(form.overshoot * way, self._least[j])
         travel = self.limits.stem[:, 1] - self.limits.stem[:, 0] - self._room
         self.immobile = tuple(j for j in self._sticky if self._least[j] > travel[j])
@@ -216,7 +223,8 @@ class EmbeddingMpc(Formulation):
         stem = solution.plan + target.stem
         cost += self.cost.constant(state - target.state, last - target.stem, target.path)
         pv = predicted_outputs(self.cost, state, target, solution)
-        op = self.op_of(last, stem[0])
+        strokes = [1 if form is None else form.strokes for form in self.forms]
+        op = self.op_of(last, stem[np.array(strokes) - 1, np.arange(len(last))])
         return Plan(op, stem, pv, solution.slack, problem.jumps, converged, cost)
 
     def optimality_gap(

@@ -1,12 +1,8 @@
-r"""The loop under the controller that knows the friction, and the one rule for its weights.
+"""The loop under the controller that knows the friction.
 
-All weights follow from the identified loop, in units of OP's and PV's own movement:
+Horizon and weights are the defaults of :class:`.ControlSettings`, which scale with the loop. Beside
+them
 
-- the horizon reaches to where 95 % of a step's response have come, 20 to 60 samples;
-- the output's weight is 1, and on a move of the stem :math:`S = \rho g^2` with g the response soon
-  after a step, see ``ANSWERED``: what the controller waits for longer it need not answer faster;
-- the price of a jump is what the output's noise costs over the samples of ``PRICED``: what is no
-  more than noise is not worth a slip;
 - the observer's variances of noise and of a wandering load are those of the load's own moves:
   white noise of variance r on a random walk of variance q makes moves of variance q + 2 r of
   which neighbours have the covariance −r;
@@ -25,7 +21,6 @@ possible.
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import Any
 
 import numpy as np
@@ -41,24 +36,6 @@ from stiction_ros.gain.recorded_loop import RecordedLoop
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
 from stiction_ros.loop import LoopModel
-
-MOVE_SHARE = 2.0
-"""ρ: moves of the stem against what they do to PV."""
-
-ANSWERED = 5
-"""Samples, besides the dead time, after which g is read: what the controller gets back soon."""
-
-PRICED = 4.0
-"""Samples of noise that a jump must be worth."""
-
-SHORTEST, LONGEST = 20, 60
-"""Samples of the horizon."""
-
-SETTLED = 0.95
-"""Share of a step's response that the horizon reaches to."""
-
-STARTED = 1e-3
-"""Share of its largest value from which a step's response has begun."""
 
 MARGIN = 0.3
 """Share of the half-widths of the frictions' intervals that a jump is larger than it must be."""
@@ -157,20 +134,11 @@ class EmbeddingDesign:
             InputError: a law by which no OP can be planned.
         """
         static = jump_form(friction).static_friction
-        response, soon = _response(model)
-        gain = float(response[soon])
         noise, walk = variances
         settings = ControlSettings(
-            horizon=int(np.clip(_settled(response), SHORTEST, LONGEST)),
-            output_weights=(1.0,),
-            move_weights=(max(MOVE_SHARE * gain**2, 1e-9),),
-            embedding_move_weights=(max(MOVE_SHARE * gain**2, 1e-9),),
             state_noise=(STEM_NOISE * static) ** 2,
             disturbance_noise=(walk,),
             measurement_noise=(noise,),
-            jump_price=PRICED * noise,
-            look_ahead=0,
-            kick_limits=(math.inf,),
             slip_check=False,
         )
         return cls(model, settings, friction, spread)
@@ -194,13 +162,13 @@ class EmbeddingDesign:
             pv_scale: engineering units of a PV of 1 of the model.
             op_scale: % of an OP of 1 of the model.
         """
-        settings, pv, op = self.settings, pv_scale**2, op_scale**2
+        settings, design, pv, op = self.settings, self.built(), pv_scale**2, op_scale**2
         return {
             "horizon": float(settings.horizon),
             "look_ahead": float(settings.look_ahead),
             "output_weights": 1.0 / pv,
-            "embedding_move_weights": settings.embedding_move_weights[0] / op,
-            "jump_price": settings.jump_price,
+            "embedding_move_weights": float(design.embedding.move[0, 0]) / op,
+            "jump_price": design.jumps.jump_price,
             "state_noise": settings.state_noise * op,
             "disturbance_noise": settings.disturbance_noise[0] * pv,
             "measurement_noise": settings.measurement_noise[0] * pv,
@@ -263,21 +231,6 @@ def embedded(loop: RecordedLoop, design: EmbeddingDesign, draws: Draws) -> list[
             op[r, k, j] = run(float(pv[r, k, i]), float(sp[k]), float(op[r, k - 1, j]))
 
     return loop.under(control, draws)
-
-
-def _response(model: LoopModel) -> tuple[FloatArray, int]:
-    """Return the response to a step of the stem and the sample at which g is read."""
-    linear = model.process.linear(model.sample_time)
-    response = linear.step_responses(4 * LONGEST)[:, 0, 0]
-    moved = np.abs(response) > STARTED * np.abs(response[:LONGEST]).max()
-    first = int(np.argmax(moved)) if moved.any() else 0
-    return response[first : first + LONGEST + 1], ANSWERED
-
-
-def _settled(response: FloatArray) -> int:
-    """Return after how many samples a response stays within 5 % of its end."""
-    away = np.abs(response - response[-1]) > (1.0 - SETTLED) * np.abs(response[-1])
-    return int(np.flatnonzero(away)[-1]) + 2 if away.any() else 1
 
 
 def _variances(load: FloatArray) -> tuple[float, float]:

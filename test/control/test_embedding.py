@@ -351,6 +351,14 @@ def test_there_are_17_patterns_of_one_valve_and_81_of_two() -> None:
     assert [len(patterns(n)) ** n for n in (1, 2, 3)] == [17, 81, 125]
 
 
+def test_a_law_of_two_strokes_jumps_a_sample_later_and_back_after_a_rest() -> None:
+    once, twice = patterns(1), patterns(1, strokes=2)
+    assert [(p.direction, p.wait) for p in twice] == [
+        (p.direction, p.wait + abs(p.direction)) for p in once
+    ]
+    assert [p.second for p in twice] == [p.second + 2 * (p.second > 0) for p in once]
+
+
 def test_a_jump_that_is_better_later_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     """Patterns that wait a sample are never dearer, and now and then gain a lot."""
     model, friction = first_order(), HeStiction(8.0, 1.0)

@@ -183,3 +183,14 @@ def test_values_that_no_valve_has_are_refused(values: dict[str, float], where: s
     with pytest.raises(InputError) as caught:
         ChoudhuryStiction.from_mapping(values)
     assert caught.value.where == where
+
+
+def test_a_stem_that_moves_goes_on_with_op_before_it_rests() -> None:
+    law = ChoudhuryStiction(7.0, 3.0)
+    form, memory, stems, op, left = law.jump_form(), law.rest(50.0), [50.0], 50.0, []
+    for wanted in (60.0, 60.0, 66.0, 66.0, 66.0):
+        op, *left = form.way(op, stems[-1], wanted, left)
+        memory, stem = law.step(memory, op)
+        stems.append(stem)
+    assert stems == [50.0, 50.0, 58.0, 64.0, 64.0, 64.0]
+    assert left == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import ClassVar, Self
 
 import numpy as np
@@ -74,17 +75,25 @@ class JumpForm:
         """Return whether ``op`` moves a stem that rests at ``stem``."""
         return abs(op - stem) > self.static_friction
 
-    def way(self, applied: float, stem: float, op: float) -> list[float]:
+    def way(
+        self, applied: float, stem: float, op: float, under_way: Sequence[float] = ()
+    ) -> list[float]:
         """Return OP, %, of the samples by which a resting stem slips as ``op`` means it to.
 
         Where one stroke is not enough, OP goes there in equal strokes and rests a sample behind,
-        as the stem must come to rest before OP turns.
+        as the stem must come to rest before OP turns. Before that rest it goes on with OP.
 
         Args:
             applied: OP in force, %.
             stem: where the stem rests, %.
             op: where a slip ends, or anything that makes none, %.
+            under_way: what is left of the way before, %.
         """
+        onwards = (op - applied) * (applied - stem) > 0.0
+        if len(under_way) == 1 and onwards and self.slips(stem, op):
+            return [op, op]
+        if under_way:
+            return list(under_way)
         if self.strokes == 1 or not self.slips(stem, op):
             return [op]
         turned = (op - applied) * (op - stem) <= 0.0

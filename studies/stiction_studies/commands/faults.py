@@ -53,6 +53,11 @@ def add(commands: Any) -> None:
         "--speed", type=float, default=25.0, metavar="N", help="speed in realtime pace (25)"
     )
     parser.add_argument(
+        "--two-loops",
+        action="store_true",
+        help="in lockstep, with a second loop whose OP must be that of a run without faults",
+    )
+    parser.add_argument(
         "--out", metavar="DIR", help="folder for logs and bags of cases that fail (out/faults)"
     )
     parser.add_argument(
@@ -82,6 +87,7 @@ def run(options: argparse.Namespace) -> int:
         for fault in faults
         for pace, phase in fault.cases
         if options.pace in (None, pace.value) and options.phase in (None, phase.value)
+        if pace is Pace.LOCKSTEP or not options.two_loops
     ]
     if not cases:
         raise InputError("no case is left", fix="leave --pace and --phase out")
@@ -101,7 +107,7 @@ def run_cases(cases: Sequence[Case], options: argparse.Namespace) -> list[Outcom
         for place, (fault, pace, phase) in enumerate(cases)
     ]
     kept = Path(options.out or "out/faults")
-    work = functools.partial(_run, kept, options.seed, options.speed)
+    work = functools.partial(_run, kept, options.seed, options.speed, options.two_loops)
     return run_each(work, asked, options.jobs, f"faults: {len(cases)} cases")
 
 
@@ -119,13 +125,13 @@ class _Asked:
         return f"{self.fault}-{self.pace}-{self.phase}"
 
 
-def _run(kept: Path, seed: int, speed: float, asked: _Asked) -> Outcome:
+def _run(kept: Path, seed: int, speed: float, two: bool, asked: _Asked) -> Outcome:
     from stiction_studies.faults.case import Options, run_case
     from stiction_studies.faults.catalogue import find
 
     os.environ["ROS_DOMAIN_ID"] = str(asked.domain % DOMAINS)
     with tempfile.TemporaryDirectory(prefix="stiction_fault_") as folder:
-        settings = Options(seed, speed)
+        settings = Options(seed, speed, two)
         outcome = run_case(find(asked.fault), asked.pace, asked.phase, Path(folder), settings)
         if not outcome.passed:
             keep(Path(folder), kept / asked.title)

@@ -20,6 +20,7 @@ from stiction_studies.faults.judgement.notices import (
 from stiction_studies.faults.loop.reference import allowed_move
 from stiction_studies.faults.loop.running import RunningLoop
 from stiction_studies.faults.loop.setting_up import HAND_OVER, SETTLING, WARM_UP
+from stiction_studies.faults.neighbour import Neighbour
 from stiction_studies.faults.observation import BagFound, Ended, Known, Observation
 from stiction_studies.faults.terms import Bag, Pace, Phase
 
@@ -39,10 +40,12 @@ class Options:
     Attributes:
         seed: of the plant's noise.
         speed: simulated seconds per second of realtime pace.
+        two: whether a second loop runs beside it, which the fault must not reach.
     """
 
     seed: int = 1
     speed: float = 25.0
+    two: bool = False
 
 
 def run_case(
@@ -59,11 +62,18 @@ def run_case(
     allowed = allowed_move(Phase.AFTER if fault.swaps else phase, options.seed)
     loop = RunningLoop(fault, pace, phase, options.seed, options.speed, directory)
     watched = _Watched(loop, fault)
+    second = Neighbour(loop, options.seed, options.speed) if options.two else None
     try:
+        if second is not None:
+            second.start(START)
         loop.start()
         watched.run()
         seen = watched.observation(time.monotonic())
+        if second is not None:
+            second.compare()
     finally:
+        if second is not None:
+            second.end()
         loop.stop()
     # Where the suite stands between the nodes nobody waits for the recorder at the start.
     since = seen.begun if fault.relayed else 0.0

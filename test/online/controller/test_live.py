@@ -11,9 +11,15 @@ import pytest
 
 from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlMode, StepStatus
-from stiction_ros.effects import HeStiction, SmoothedHeStiction
+from stiction_ros.effects import (
+    ChoudhuryStiction,
+    FrictionLaw,
+    HeStiction,
+    KanoStiction,
+    SmoothedHeStiction,
+)
 from stiction_ros.errors import InputError
-from stiction_ros.loop import LoopModel, Plant, SetPoints
+from stiction_ros.loop import LoopModel, Plant, SetPoints, ValveChange
 from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.controller.settings import LiveControllerSettings
 
@@ -235,10 +241,13 @@ def process_of_gain(factor: float) -> LoopModel:
 WORSE = process_of_gain(0.3).with_valve_effects({"V1": [HeStiction(5.0, 2.0)]})
 
 
-def test_a_controller_that_is_worse_is_rolled_back() -> None:
+@pytest.mark.parametrize("law", [HeStiction, KanoStiction])
+def test_a_controller_that_is_worse_is_rolled_back(law: type[FrictionLaw]) -> None:
+    sticky = {"V1": [law.from_frictions(5.0, 2.0)]}
     run = Run(LiveController(watched(), PROCESS))
+    run.plant = Plant(PLANT.with_valve_effects(sticky), 1)
     run.go(350)
-    run.live.offer(WORSE, 350)
+    run.live.offer(WORSE.with_valve_effects(sticky), 350)
     run.go(500)
     assert [mode for _, mode in modes(run.live)] == ["unaware", "embedding", "unaware"]
     assert run.live.changes[-1].reason.startswith("rolled back: ")
@@ -676,15 +685,21 @@ def test_friction_beyond_the_travel_is_said_and_the_valve_left_alone() -> None:
     assert "V1 cannot be moved" in result.reason
 
 
-def test_a_change_found_by_the_slip_check_is_told() -> None:
-    sticky = PLANT.with_valve_effects({"V1": [HeStiction(9.0, 2.0)]})
-    run = Run(LiveController(SETTINGS, KNOWN))
-    run.plant = Plant(sticky, 1)
+@pytest.mark.parametrize("law", [HeStiction, KanoStiction, ChoudhuryStiction])
+def test_a_valve_that_sticks_more_in_mid_run_is_found_by_the_slip_check(
+    law: type[FrictionLaw],
+) -> None:
+    before, after = law.from_frictions(5.0, 2.0), law.from_frictions(9.0, 2.0)
+    known = PROCESS.with_valve_effects({"V1": [before]})
+    run = Run(LiveController(SETTINGS, known))
+    sticky = PLANT.with_valve_effects({"V1": [before]})
+    run.plant = Plant(sticky, 1, [ValveChange(40.0, "V1", (after,))])
     run.go(900)
-    told = [change for change in run.live.changes if "V1 stayed" in change.reason]
+    told = [change.sample for change in run.live.changes if "V1 stayed" in change.reason]
     assert told
+    assert min(told) > 40
     friction = run.live.frictions[0]
-    assert isinstance(friction, HeStiction)
+    assert isinstance(friction, law)
     assert 5.0 < friction.static_friction <= 9.0
     run.live.retune(settings(horizon=40))
     run.go(1)

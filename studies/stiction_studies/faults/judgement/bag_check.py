@@ -27,7 +27,7 @@ def check_bag(path: Path, heard: Mapping[str, Sequence[Sampled]]) -> BagFound:
         for one in read_messages(path, wanted=lambda topic: topic.name in topics):
             wanted[topics[one.topic]].discard(stamp_ns(one.message))
         missing = sum(len(stamps) for stamps in wanted.values())
-        read_bag_parts(path)
+        read_bag_parts(path, namespace="/")
     except InputError as error:
         return BagFound(expected, expected, str(error))
     return BagFound(expected, missing)

@@ -60,7 +60,7 @@ class Probe:
         self.context.init(domain_id=int(environment["ROS_DOMAIN_ID"]))
         self.node = Node("faults", context=self.context)
         self.commander = commander
-        self.heard: dict[str, list[Sampled]] = {topic: [] for topic in topics}
+        self.heard: dict[str, list[Sampled]] = {}
         self.statuses: list[Shown] = []
         self.tasks: list[Shown] = []  # the same of single tasks, by name of the status
         self.values: dict[str, dict[str, str]] = {}  # by name of the status
@@ -71,7 +71,7 @@ class Probe:
         self._publishers: dict[str, Publisher] = {}
         self._nodes: list[Node] = [self.node]
         for topic in topics:
-            self.node.create_subscription(JointState, topic, self._hearing(topic), DEEP_QOS)
+            self.hear(topic)
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_status, DEEP_QOS)
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
@@ -102,6 +102,11 @@ class Probe:
         self._executor.wake()
 
     # ---- what is heard ---------------------------------------------------------------------
+
+    def hear(self, topic: str) -> None:
+        """Hear one more topic of signals from now on."""
+        self.heard[topic] = []
+        self.node.create_subscription(JointState, topic, self._hearing(topic), DEEP_QOS)
 
     def _hearing(self, topic: str) -> Callable[[Any], None]:
         taken = self.heard[topic]

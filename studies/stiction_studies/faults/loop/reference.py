@@ -53,6 +53,16 @@ def allowed_move(phase: Phase, seed: int) -> float:
     limits = np.asarray(found.controller.op_rate_limits, dtype=float)
     if np.isfinite(limits).all():
         return float(limits.max())
-    run = simulate_closed_loop(found.plant, _Reference(phase), found.set_points, SAMPLES, seed)
-    op = np.vstack([found.plant.stem_start, run.record.op])
-    return SLACK * float(np.abs(np.diff(op, axis=0)).max())
+    return SLACK * float(np.abs(np.diff(ops_without_fault(phase, seed), axis=0)).max())
+
+
+def ops_without_fault(phase: Phase, seed: int, samples: int = SAMPLES) -> list[tuple[float, ...]]:
+    """Return OP in force at each sample of the run without faults, that of the start first, %.
+
+    Args:
+        phase, seed: as :func:`allowed_move`.
+        samples: of the run.
+    """
+    found = scenario()
+    run = simulate_closed_loop(found.plant, _Reference(phase), found.set_points, samples, seed)
+    return [tuple(row) for row in [list(found.plant.stem_start), *run.record.op.tolist()]]
