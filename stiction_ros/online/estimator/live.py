@@ -35,13 +35,13 @@ from stiction_ros.online.schedule import FitSchedule
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
 
-METHOD = "exact"
-"""Search of the windows: a sliding window is fitted again and again, beside a loop that runs."""
-
-LAWS = ("he", "kano", "choudhury", "xch", "semi_physical", AUTO)
-
 LAW_METHOD = "evidence"
 """Search that tells a law which is left open."""
+
+METHOD = "exact"
+"""Search of the windows unless another is asked for: it runs again and again, beside a loop."""
+
+LAWS = ("he", "kano", "choudhury", "xch", "semi_physical", AUTO)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,6 +53,12 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
     input_order: int = setting(0, "n_b of the ARX model; 0 chooses by BIC", low=0, high=20)
     delay_low: int = setting(0, "smallest delay tried, samples", low=0)
     delay_high: int = setting(10, "largest delay tried, samples", low=0)
+    method: str = setting(
+        METHOD,
+        "search of the windows: exact takes the process at its word; evidence takes several times "
+        "as long and is not misled by what neighbours do to pv",
+        choices=(METHOD, LAW_METHOD),
+    )
     law: str = setting(
         "he",
         "friction law of the valves; auto asks each window, until friction is trusted, whether "
@@ -63,7 +69,7 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
     @property
     def methods(self) -> tuple[str, ...]:
         """The searches that fits take."""
-        return (LAW_METHOD, METHOD) if self.law == AUTO else (METHOD,)
+        return (LAW_METHOD, self.method) if self.law == AUTO else (self.method,)
 
     def options(self) -> IdentificationOptions:
         """Return what :func:`stiction_ros.identification.identify` is asked.
@@ -82,7 +88,7 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
             output_order=self.output_order or None,
             input_order=self.input_order or None,
             delay=(self.delay_low, self.delay_high),
-            method=METHOD,
+            method=self.method,
             law=self.law,
             check_columns=False,
         )
