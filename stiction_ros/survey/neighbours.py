@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.intake.loop import Loop
+from stiction_ros.loop.member_loops import SET_POINT
 from stiction_ros.records.record import Record
 from stiction_ros.survey.assess import assess
 from stiction_ros.survey.entry import Entry
@@ -104,19 +105,22 @@ def neighbours(records: Mapping[str, Record]) -> Neighbours:
     sources = {
         entry.name: ", ".join(records[entry.name].valves)
         for entry in entries
-        if entry.found and entry.cause == "valve"
+        if entry.found and entry.cause == "valve" and not _outer(records[entry.name])
     }
     disturbed = []
     for group in groups:
-        source = group.names[0]
-        if source not in sources:
-            continue
+        source = next((name for name in group.names if name in sources), "")
         disturbed += [
             Disturbed(name, source, group.period, _behind(by_name[source], by_name[name]))
-            for name in group.names[1:]
-            if name not in sources
+            for name in group.names
+            if source and name not in sources
         ]
     return Neighbours(by_name, tuple(groups), sources, tuple(disturbed))
+
+
+def _outer(record: Record) -> bool:
+    """Tell whether a loop moves set-points alone: a friction behind these is of an inner loop."""
+    return all(tag.endswith(SET_POINT) for tag in record.valves)
 
 
 def _behind(source: Entry, other: Entry) -> float:

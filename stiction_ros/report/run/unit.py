@@ -15,9 +15,10 @@ from stiction_ros.report.page import Cell, duration, number, page_file, table
 from stiction_ros.report.run.figures import whole_run
 from stiction_ros.report.run.identified import KINDS, valve_cards
 from stiction_ros.report.run.page import findings
-from stiction_ros.report.run.scoring import PhaseStatus, phases
+from stiction_ros.report.run.scoring import Phase, PhaseStatus, errors, phases
 from stiction_ros.report.run.story import Story, tell
 from stiction_ros.report.run.summary import summary, write_json
+from stiction_ros.signals.oscillation import amplitude
 from stiction_ros.survey.neighbours import Neighbours, neighbours
 
 UNIT_COLUMNS = (
@@ -123,7 +124,7 @@ def unit_page(report: UnitReport) -> str:
         *[f'<p class="lead">{words(line)}</p>' for line in said],
         table(UNIT_COLUMNS, unit_rows(report), texts=4),
         '<p class="soft">Verdict, cause and period: of what was recorded before the first swap. '
-        "Amplitude: of the cycle in PV − SP, before and after this swap.</p>",
+        "Amplitude: of PV − SP at this period, one round of set-points before and one after it.</p>",
     ]
     for name, story in report.stories.items():
         parts += [
@@ -135,6 +136,17 @@ def unit_page(report: UnitReport) -> str:
     return framed(f"{report.name}: {headline}", parts, SCRIPT)
 
 
+def cycle_of(story: Story, phase: Phase | None, period: float | None) -> float | None:
+    """Return the amplitude of PV − SP at ``period`` (s) in a phase, engineering units.
+
+    Moves of the set-point are within it: that of an inner loop moves all the time.
+    """
+    if phase is None or period is None:
+        return None
+    error = errors(story.record)[0][phase.first : phase.last, 0]
+    return amplitude(error, [(0, len(error))], period / story.record.sample_time)
+
+
 def unit_rows(report: UnitReport) -> list[list[Cell]]:
     """Return a row for each loop: verdict, cause, period, phase behind the source, amplitudes."""
     behind = {one.name: one.behind for one in report.found.disturbed}
@@ -142,12 +154,8 @@ def unit_rows(report: UnitReport) -> list[list[Cell]]:
     rows: list[list[Cell]] = []
     for name, story in report.stories.items():
         entry, found = report.found.entries[name], story.phases
-        output = story.record.outputs[0]
-        was, now = (
-            None if phase is None else phase.scores[output].amplitude
-            for phase in (found.before, found.after)
-        )
         period = None if entry.oscillation is None else entry.oscillation.period
+        was, now = (cycle_of(story, phase, period) for phase in (found.before, found.after))
         verdict = entry.verdict or entry.reason
         cause = f"disturbed by {by[name]}" if name in by else entry.cause or "–"
         share = "–" if not was or now is None else f"{100 * now / was:.0f} %"
