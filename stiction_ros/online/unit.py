@@ -7,6 +7,7 @@ settings and seed both give the same numbers.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -88,7 +89,7 @@ class UnitScenario:
         wiring, members = Wiring(plant.model, loops), {}
         for loop in loops:
             own = top.section(loop.name, {})
-            nodes = {node: common[node] | _parameters(own, node) for node in OWN}
+            nodes = {n: copy.deepcopy(common[n]) | _parameters(own, n) for n in OWN}
             own.finish()
             told |= {f"{loop.name}/{node}": nodes[node] for node in OWN}
             known = LoopModel.load(path.parent / str(nodes["controller"].get("model", "")))
