@@ -105,7 +105,7 @@ def neighbours(records: Mapping[str, Record]) -> Neighbours:
     sources = {
         entry.name: ", ".join(records[entry.name].valves)
         for entry in entries
-        if entry.found and entry.cause == "valve" and not _outer(records[entry.name])
+        if entry.found and entry.cause == "valve" and not is_outer(records[entry.name])
     }
     disturbed = []
     for group in groups:
@@ -118,7 +118,7 @@ def neighbours(records: Mapping[str, Record]) -> Neighbours:
     return Neighbours(by_name, tuple(groups), sources, tuple(disturbed))
 
 
-def _outer(record: Record) -> bool:
+def is_outer(record: Record) -> bool:
     """Tell whether a loop moves set-points alone: a friction behind these is of an inner loop."""
     return all(tag.endswith(SET_POINT) for tag in record.valves)
 

@@ -19,7 +19,7 @@ from stiction_ros.report.run.scoring import Phase, PhaseStatus, errors, phases
 from stiction_ros.report.run.story import Story, tell
 from stiction_ros.report.run.summary import summary, write_json
 from stiction_ros.signals.oscillation import amplitude
-from stiction_ros.survey.neighbours import Neighbours, neighbours
+from stiction_ros.survey.neighbours import Neighbours, is_outer, neighbours
 
 UNIT_COLUMNS = (
     *("loop", "valve", "verdict", "cycles by", "period, s", "behind, s"),
@@ -130,7 +130,9 @@ def unit_page(report: UnitReport) -> str:
         parts += [
             f"<h2>{text(name)}</h2>",
             *[f"<p>{words(line)}</p>" for line in findings(story)],
-            valve_cards(story.identified.get("valves", []), story),
+            valve_cards(story.identified.get("valves", []), story)
+            if name in report.found.sources
+            else "",
             whole_run(story).replace("<h2>The whole run</h2>", ""),
         ]
     return framed(f"{report.name}: {headline}", parts, SCRIPT)
@@ -156,7 +158,7 @@ def unit_rows(report: UnitReport) -> list[list[Cell]]:
         entry, found = report.found.entries[name], story.phases
         period = None if entry.oscillation is None else entry.oscillation.period
         was, now = (cycle_of(story, phase, period) for phase in (found.before, found.after))
-        verdict = entry.verdict or entry.reason
+        verdict = "no valve" if is_outer(story.record) else entry.verdict or entry.reason
         cause = f"disturbed by {by[name]}" if name in by else entry.cause or "–"
         share = "–" if not was or now is None else f"{100 * now / was:.0f} %"
         valves = ", ".join(story.record.valves)
