@@ -72,6 +72,11 @@ def _check(tags: list[str], known: set[str], where: str) -> None:
             raise InputError(f"{tag} {said}", where=where, fix=f"use {', '.join(sorted(known))}")
 
 
+def is_set_point(tag: str) -> bool:
+    """Tell whether an OP is the set-point of an inner loop and moves no valve of its own."""
+    return tag.endswith(SET_POINT)
+
+
 def whole_plant(model: LoopModel) -> MemberLoop:
     """Return the one loop, without a name of its own, that has all tags of ``model``."""
     return MemberLoop("", model.valve_names, model.outputs)
@@ -90,7 +95,7 @@ class Wiring:
         at_rest = model.stem_start.tolist() + model.pv_start.tolist()
         tags = (*model.valve_names, *(tag + SET_POINT for tag in model.outputs))
         self._given = dict(zip(tags, at_rest, strict=True))
-        cascaded = {tag for loop in loops for tag in loop.valves if tag.endswith(SET_POINT)}
+        cascaded = {tag for loop in loops for tag in loop.valves if is_set_point(tag)}
         self._set = [tag if tag + SET_POINT in cascaded else "" for tag in model.outputs]
 
     def op_of(self, loop: MemberLoop) -> FloatArray:

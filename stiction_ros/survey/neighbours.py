@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.intake.loop import Loop
-from stiction_ros.loop.member_loops import SET_POINT
+from stiction_ros.loop.member_loops import is_set_point
 from stiction_ros.records.record import Record
 from stiction_ros.survey.assess import assess
 from stiction_ros.survey.entry import Entry
@@ -120,7 +120,7 @@ def neighbours(records: Mapping[str, Record]) -> Neighbours:
 
 def is_outer(record: Record) -> bool:
     """Tell whether a loop moves set-points alone: a friction behind these is of an inner loop."""
-    return all(tag.endswith(SET_POINT) for tag in record.valves)
+    return all(map(is_set_point, record.valves))
 
 
 def _behind(source: Entry, other: Entry) -> float:

@@ -21,6 +21,7 @@ from stiction_ros.identification import (
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import AUTO
 from stiction_ros.loop import LoopModel
+from stiction_ros.loop.member_loops import is_set_point
 from stiction_ros.online.estimator.change_evidence import LEAST_ROWS, Evidence, Reference
 from stiction_ros.online.estimator.friction_change import (
     ChangeRule,
@@ -248,6 +249,9 @@ class LiveEstimator:
         elif not self._young(end):
             kept = {n for n, f in self._trust.trusted.items() if not f.settled}
             kept |= {change.valve for change in changes if change.doubted}
+            kept |= {
+                name for name in self.valves if is_set_point(name)
+            }  # the inner loop's friction
             self._trust.update(found.valves, kept, {c.valve for c in changes if c.explained})
         trusted = dict(self._trust.trusted)
         if record is not None and not before and trusted and self._reference is None:
