@@ -75,14 +75,20 @@ def read_nodes(path: Path, without: str = "") -> dict[str, dict[str, Any]]:
         key = f"/**/{name}" if f"/**/{name}" in top else name
         if name == without and key not in top:
             continue
-        values = dict(top.section(key).section("ros__parameters").values)
-        if "valve_changes" in values:
-            values["valve_changes"] = valve_changes_text(values["valve_changes"])
+        values = node_values(top.section(key).section("ros__parameters"))
         settings_from_mapping(settings, values, f"{path}: {name}")
         if name != without:
             nodes[name] = values
     top.finish()
     return nodes
+
+
+def node_values(section: Section) -> dict[str, Any]:
+    """Return the parameters of a node as ROS takes them; changes of valves may stand as a list."""
+    values = dict(section.values)
+    if "valve_changes" in values:
+        values["valve_changes"] = valve_changes_text(values["valve_changes"])
+    return values
 
 
 @dataclasses.dataclass(frozen=True)

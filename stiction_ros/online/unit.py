@@ -26,6 +26,7 @@ from stiction_ros.online.session import (
     LoopSession,
     Scenario,
     SimulatedPlant,
+    node_values,
     read_plant,
 )
 from stiction_ros.records import Record
@@ -84,7 +85,10 @@ class UnitScenario:
         for node, given in told.items():
             settings_from_mapping(NODE_SETTINGS[node], given, f"{path}: {node}")
         plant = read_plant(told["plant"], path)
-        loops = read_member_loops(told["plant"]["loops"], plant.model, f"{path}: plant: loops")
+        where = f"{path}: plant: loops"
+        loops = read_member_loops(told["plant"].get("loops", ()), plant.model, where)
+        if not loops:
+            raise InputError("names no loop", where=where, fix="write NAME: VALVE -> OUTPUT")
         common = {node: _parameters(top, f"/**/{node}") for node in OWN}
         wiring, members = Wiring(plant.model, loops), {}
         for loop in loops:
@@ -122,7 +126,7 @@ def load_scenario(path: Path | str) -> Scenario | UnitScenario:
 
 
 def _parameters(top: Section, node: str) -> dict[str, Any]:
-    return dict(top.section(node, {}).section("ros__parameters", {}).values)
+    return node_values(top.section(node, {}).section("ros__parameters", {}))
 
 
 class _Sessions:
