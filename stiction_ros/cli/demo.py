@@ -19,6 +19,7 @@ from stiction_ros.errors import InputError, storing
 
 if TYPE_CHECKING:
     from stiction_ros.online.session import Scenario
+    from stiction_ros.online.unit import UnitScenario
 
 
 OPCUA = "opcua"
@@ -40,7 +41,8 @@ def add(commands: Any) -> None:
         "scenario",
         nargs="*",
         metavar="SCENARIO",
-        help="tank, siso, or a file (default: both)" + (OPCUA_HELP if opcua else ""),
+        help="tank, siso, neighbours, cascade, or a file (default: tank and siso)"
+        + (OPCUA_HELP if opcua else ""),
     )
     parser.add_argument(
         "--out", default="out", metavar="DIR", help="folder of the results (default: out)"
@@ -70,9 +72,9 @@ def run(options: argparse.Namespace) -> int:
     names = options.scenario or SCENARIOS
     paths = [find(name) for name in names if name != OPCUA]
     opcua = extensions.needed_part("demo opcua") if OPCUA in names else None
-    from stiction_ros.online.session import Scenario
+    from stiction_ros.online.unit import load_scenario
 
-    scenarios = [Scenario.load(path) for path in paths]
+    scenarios = [load_scenario(path) for path in paths]
     require_ros()
     signal.signal(signal.SIGTERM, _interrupt)
     good = True
@@ -91,9 +93,10 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_scenario(
-    scenario: Scenario, directory: Path, options: argparse.Namespace, show: Bar
+    scenario: Scenario | UnitScenario, directory: Path, options: argparse.Namespace, show: Bar
 ) -> bool:
     """Run one scenario and print its table; return whether it succeeded."""
+    from stiction_ros.online.session import Scenario
     from stiction_ros.report.run.report import report_run
 
     name = scenario.name
@@ -112,10 +115,33 @@ def _run_scenario(
         return False
     seconds = time.monotonic() - begin
     show(0.92, f"{name}: reporting")
+    if not isinstance(scenario, Scenario):
+        return _report_unit(scenario, directory, seconds)
     report = report_run(directory / "bag", directory, scenario=scenario, seconds=seconds, load=load)
     show(1.0)
     _print(report.summary, directory)
     return bool(report.summary["status"] == "ok")
+
+
+def _report_unit(scenario: UnitScenario, directory: Path, seconds: float) -> bool:
+    """Write the page of all loops and print what it says; return whether the run succeeded."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from stiction_ros.report.run.unit import UNIT_COLUMNS, report_unit, unit_rows
+
+    report = report_unit(
+        directory / "bag", directory, list(scenario.members), scenario=scenario, seconds=seconds
+    )
+    console = Console()
+    for line in report.found.sentences:
+        console.print(f"{scenario.name}: {line}")
+    table = Table(*UNIT_COLUMNS, title=scenario.name, title_justify="left")
+    for row in unit_rows(report):
+        table.add_row(*(cell if isinstance(cell, str) else cell[1] for cell in row))
+    console.print(table)
+    console.print(f"{report.page}")
+    return report.status == "ok"
 
 
 def _print(summary: dict[str, Any], directory: Path) -> None:

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import time
+from collections import Counter
 from typing import Any
 
-import numpy as np
 from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from stiction_ros.config_files import find_config
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints, read_valve_changes
+from stiction_ros.loop.member_loops import MemberLoop, Wiring, read_member_loops, whole_plant
 from stiction_ros.nodes.shared.managed import LOOKS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_ns, to_stamp, values_of
-from stiction_ros.nodes.shared.peers import publishers_of
+from stiction_ros.nodes.shared.peers import Outlet, publishers_of
 from stiction_ros.nodes.shared.runner import run
 from stiction_ros.nodes.shared.typed import restart
 from stiction_ros.online.health import stopped_after
@@ -26,6 +30,27 @@ from stiction_ros.online.tick_grid import TickGrid
 
 AGAIN = 1.0  # s after which a sample in lockstep is shown again
 UNEASY = 3.0  # s without op after which a run in lockstep says so
+
+
+@dataclasses.dataclass
+class JoinedLoop:
+    """One loop of the plant: its topics, its OP in force, and when its controller was heard."""
+
+    loop: MemberLoop
+    op_port: OpPort
+    op: FloatArray
+    applied: JointState
+    op_applied: Outlet
+    pv: Outlet
+    sp: Outlet | None = None
+    stem: Outlet | None = None
+    dv: Outlet | None = None
+    given: bool = False
+    heard: float = dataclasses.field(default_factory=time.monotonic)
+
+    def topic(self, name: str) -> str:
+        """Return the name of one of its topics."""
+        return f"{self.loop.name}/{name}" if self.loop.name else name
 
 
 class PlantNode(ManagedNode):
@@ -51,36 +76,50 @@ class PlantNode(ManagedNode):
             settings.valve_changes, self.model.valve_names, "plant: valve_changes"
         )
         self.plant = Plant(self.model, settings.seed, changes)
-        self._op = np.array(self.model.stem_start)
         self._step = round(self.model.sample_time * SECOND)
         self._start = round(settings.start_time * SECOND)
         self.stamp = self._start
-        # What was in force before the run: a reader knows the OP of its first sample.
-        self._applied = joint_state(self._start - self._step, self.model.valve_names, self._op)
         self._realtime = settings.pace == "realtime"
-        rules = CommandRules(self._commander(), self._step, exact=not self._realtime)
-        self.op_port, self.round_trips = OpPort(rules), RoundTrips()
+        loops = read_member_loops(settings.loops, self.model, "plant: loops")
+        self.wiring = Wiring(self.model, loops or [whole_plant(self.model)])
+        self.round_trips = RoundTrips()
         self._missed = self._repeats = 0
-        self._heard = self._shown = time.monotonic()
+        self._shown = time.monotonic()
         self._every = -(-settings.samples // 100)  # a hundred lines of progress
         self._clock_out = self.outlet(Clock, "/clock", SIGNAL_QOS)
-        self._applied_out = self.outlet(JointState, "op_applied", SIGNAL_QOS)
-        self._pv = self.outlet(JointState, "pv", SIGNAL_QOS, ("controller", "estimator"))
-        self._sp = None
-        if self.schedule is not None:
-            self._sp = self.outlet(JointState, "sp", SIGNAL_QOS, ("controller",))
-        self._stem = self.outlet(JointState, "stem", SIGNAL_QOS)
-        self._dv = None
-        if self.model.process.measured_disturbances:
-            self._dv = self.outlet(JointState, "dv", SIGNAL_QOS, ("controller",))
-        self.inlet(JointState, "op", self._on_op, READER_QOS, ("controller",))
+        self._loops = [self._join(loop) for loop in self.wiring.loops]
 
-    def _commander(self) -> str:
+    def _join(self, loop: MemberLoop) -> JoinedLoop:
+        """Create the topics of one loop, in the namespace of its name."""
+        space = f"{loop.name}/" if loop.name else ""  # of one loop alone: that of the plant
+        controller, estimator = f"{space}controller", f"{space}estimator"
+        rules = CommandRules(self._commander(space), self._step, exact=not self._realtime)
+        op = self.wiring.op_of(loop)
+        joined = JoinedLoop(
+            loop,
+            op_port=OpPort(rules),
+            op=op,
+            # What was in force before the run: a reader knows the OP of its first sample.
+            applied=joint_state(self._start - self._step, loop.valves, op),
+            op_applied=self.outlet(JointState, f"{space}op_applied", SIGNAL_QOS),
+            pv=self.outlet(JointState, f"{space}pv", SIGNAL_QOS, (controller, estimator)),
+        )
+        if self.schedule is not None:
+            joined.sp = self.outlet(JointState, f"{space}sp", SIGNAL_QOS, (controller,))
+        if set(loop.valves) <= set(self.model.valve_names):
+            joined.stem = self.outlet(JointState, f"{space}stem", SIGNAL_QOS)
+        if self.model.process.measured_disturbances:
+            joined.dv = self.outlet(JointState, f"{space}dv", SIGNAL_QOS, (controller,))
+        take = functools.partial(self._on_op, joined)
+        self.inlet(JointState, f"{space}op", take, READER_QOS, (controller,))
+        return joined
+
+    def _commander(self, space: str) -> str:
         """Return the full name of the node that commands; empty for the first that does."""
         name = str(self.settings.commander)
         if not name or name.startswith("/"):
             return name
-        return f"{self.get_namespace().rstrip('/')}/{name}"
+        return f"{self.get_namespace().rstrip('/')}/{space}{name}"
 
     def configuration(self) -> dict[str, Any]:
         told = {"seed": self.settings.seed, "model": self.model.to_mapping()}
@@ -90,7 +129,8 @@ class PlantNode(ManagedNode):
         return self.model.name
 
     def linked(self) -> None:
-        self._heard = time.monotonic()
+        for joined in self._loops:
+            joined.heard = time.monotonic()
         self._show_with_clock()
         if self._realtime:
             self._set_pace(self.settings.speed)
@@ -111,15 +151,21 @@ class PlantNode(ManagedNode):
             "a run in lockstep cannot go on without it, start all nodes again"
         )
 
+    @property
+    def _silent(self) -> JoinedLoop:
+        """The loop whose controller has been silent for longest."""
+        return min(self._loops, key=lambda joined: joined.heard)
+
     # ---- diagnostics -----------------------------------------------------------------------
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
-        counts = self.op_port.counts
+        ports = [joined.op_port for joined in self._loops]
+        counts: Counter[Reception] = sum((port.counts for port in ports), Counter())
         keys: list[tuple[str, object]] = [
             ("sample", self.plant.sample),
             ("pace", self.settings.pace),
-            ("commander", self.op_port.commander),
-            ("op_age", f"{time.monotonic() - self._heard:.3f}"),
+            ("commander", ", ".join(port.commander for port in ports)),
+            ("op_age", f"{time.monotonic() - self._silent.heard:.3f}"),
             ("late_op", counts[Reception.LATE]),
             ("unanswered", self.round_trips.asked - self.round_trips.answered),
         ]
@@ -135,8 +181,8 @@ class PlantNode(ManagedNode):
 
     def look(self) -> None:
         now = time.monotonic()
-        silent = now - self._heard
-        commander = self.op_port.commander or "anyone"
+        silent = now - self._silent.heard
+        commander = self._silent.op_port.commander or "anyone"
         if self._realtime:
             if silent > stopped_after(self.model.sample_time / self.settings.speed):
                 self.notice("silent", "error", f"no op from {commander}")
@@ -153,20 +199,22 @@ class PlantNode(ManagedNode):
                 self._repeats += 1
                 self._show()
         if self._looks % LOOKS == 0:
-            same = publishers_of(self, "op").count(self.op_port.commander)
-            if same > 1:
-                text = f"{same} nodes called {self.op_port.commander} publish op"
-                self.notice("commanders", "error", text)
+            for joined in self._loops:
+                commander = joined.op_port.commander
+                same = publishers_of(self, joined.topic("op")).count(commander)
+                if same > 1:
+                    text = f"{same} nodes called {commander} publish op"
+                    self.notice("commanders", "error", text)
 
     # ---- samples ---------------------------------------------------------------------------
 
-    def _on_op(self, message: JointState) -> None:
+    def _on_op(self, joined: JoinedLoop, message: JointState) -> None:
         if not self.running:
             return
         sender, stamp = message.header.frame_id, to_ns(message.header.stamp)
-        op = values_of(message, self.model.valve_names)
-        found = self.op_port.judge(sender, stamp, op, self.stamp)
-        complaint = self.op_port.complaint(found, sender)
+        op = values_of(message, joined.loop.valves)
+        found = joined.op_port.judge(sender, stamp, op, self.stamp)
+        complaint = joined.op_port.complaint(found, sender)
         if complaint:
             self.notice(found.value, "warn", complaint)
         if op is None or found is Reception.NAME:
@@ -174,8 +222,8 @@ class PlantNode(ManagedNode):
         self.round_trips.answer(stamp, time.monotonic())  # also of one that is refused as late
         if found not in (Reception.TAKEN, Reception.LATE):
             return
-        self._heard, self._op = time.monotonic(), op
-        if not self._realtime:
+        joined.op, joined.given, joined.heard = op, True, time.monotonic()
+        if not self._realtime and all(one.given for one in self._loops):
             self._advance()
 
     def _set_pace(self, speed: float) -> None:
@@ -197,12 +245,17 @@ class PlantNode(ManagedNode):
         self._advance()
 
     def _advance(self) -> None:
-        stem = self.plant.apply(self._op)
-        self._applied = joint_state(self.stamp, self.model.valve_names, self._op)
-        self._stem.publish(joint_state(self.stamp, self.model.valve_names, stem))
+        stems = self.plant.apply(self.wiring.take([joined.op for joined in self._loops]))
+        stem = dict(zip(self.model.valve_names, stems, strict=True))
+        for joined in self._loops:
+            valves, joined.given = joined.loop.valves, False
+            joined.applied = joint_state(self.stamp, valves, joined.op)
+            if joined.stem is not None:
+                joined.stem.publish(joint_state(self.stamp, valves, [stem[tag] for tag in valves]))
         self.stamp = self._start + self.plant.sample * self._step
         if self.plant.sample == self.settings.samples:
-            self._applied_out.publish(self._applied)
+            for joined in self._loops:
+                joined.op_applied.publish(joined.applied)
             self.running, self.finished = False, True
         else:
             self._show_with_clock()
@@ -216,16 +269,22 @@ class PlantNode(ManagedNode):
     def _show(self) -> None:
         """Publish the present sample; pv, which the partners act on, comes last."""
         measured = self.plant.measure()
-        self._applied_out.publish(self._applied)
-        if self._dv is not None:
-            names = self.model.process.measured_disturbances
-            self._dv.publish(joint_state(self.stamp, names, measured.dv))
-        if self._sp is not None and self.schedule is not None:
-            sp = self.schedule.at(measured.time)
-            self._sp.publish(joint_state(self.stamp, self.model.outputs, sp))
+        sp = None
+        if self.schedule is not None:
+            sp = self.wiring.set_points(self.schedule.at(measured.time))
+        for joined in self._loops:
+            joined.op_applied.publish(joined.applied)
+            if joined.dv is not None:
+                names = self.model.process.measured_disturbances
+                joined.dv.publish(joint_state(self.stamp, names, measured.dv))
+            if joined.sp is not None and sp is not None:
+                shown = self.wiring.of(joined.loop, sp)
+                joined.sp.publish(joint_state(self.stamp, joined.loop.outputs, shown))
         self._shown = time.monotonic()
         self.round_trips.ask(self.stamp, self._shown)
-        self._pv.publish(joint_state(self.stamp, self.model.outputs, measured.pv))
+        for joined in self._loops:
+            shown = self.wiring.of(joined.loop, measured.pv)
+            joined.pv.publish(joint_state(self.stamp, joined.loop.outputs, shown))
 
 
 def main() -> int:

@@ -48,6 +48,12 @@ class PlantNodeSettings(NodeSettings):
         "empty for none",
         fixed=True,
     )
+    loops: tuple[str, ...] = setting(
+        (),
+        "several loops on one plant, each in the namespace of its name: NAME: VALVE -> OUTPUT; the "
+        "valve TAG.SP is the set-point of output TAG; empty for one loop of all tags",
+        fixed=True,
+    )
     pace: str = setting(
         "lockstep",
         "lockstep waits for the op of each sample; realtime does not",

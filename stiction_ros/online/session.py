@@ -67,19 +67,59 @@ def read_nodes(path: Path, without: str = "") -> dict[str, dict[str, Any]]:
         InputError: a node that lacks or is unknown, a parameter that it does not know.
     """
     top = Section(load_yaml(path), str(path))
+    if "loops" in top.section("plant", {}).section("ros__parameters", {}):
+        fix = "start it by stiction demo, or use stiction_ros.online.unit"
+        raise InputError("holds several loops", where=str(path), fix=fix)
     nodes: dict[str, dict[str, Any]] = {}
     for name, settings in NODE_SETTINGS.items():
         key = f"/**/{name}" if f"/**/{name}" in top else name
         if name == without and key not in top:
             continue
-        values = dict(top.section(key).section("ros__parameters").values)
-        if "valve_changes" in values:
-            values["valve_changes"] = valve_changes_text(values["valve_changes"])
+        values = node_values(top.section(key).section("ros__parameters"))
         settings_from_mapping(settings, values, f"{path}: {name}")
         if name != without:
             nodes[name] = values
     top.finish()
     return nodes
+
+
+def node_values(section: Section) -> dict[str, Any]:
+    """Return the parameters of a node as ROS takes them; changes of valves may stand as a list."""
+    values = dict(section.values)
+    if "valve_changes" in values:
+        values["valve_changes"] = valve_changes_text(values["valve_changes"])
+    return values
+
+
+@dataclasses.dataclass(frozen=True)
+class SimulatedPlant:
+    """What the plant of a scenario is told: the loop, its set-points, seed, samples, changes."""
+
+    model: LoopModel
+    set_points: SetPoints
+    seed: int
+    samples: int
+    valve_changes: tuple[ValveChange, ...]
+
+
+def read_plant(values: Mapping[str, Any], path: Path) -> SimulatedPlant:
+    """Return what the parameters of the plant in the scenario file ``path`` name.
+
+    Raises:
+        InputError: a parameter or a file that cannot be used.
+    """
+    where = f"{path}: plant"
+    told = settings_from_mapping(PlantNodeSettings, values, where)
+    if told.samples < 1 or not told.set_points:
+        raise InputError("a scenario needs samples ≥ 1 and set_points", where=where)
+    model = LoopModel.load(path.parent / told.model)
+    return SimulatedPlant(
+        model,
+        SetPoints.load(path.parent / told.set_points, model.outputs),
+        told.seed,
+        told.samples,
+        read_valve_changes(told.valve_changes, model.valve_names, f"{where}: valve_changes"),
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -137,14 +177,29 @@ class Scenario:
         """
         path = Path(path)
         nodes = read_nodes(path)
+        return cls.of(path.name.split(".")[0], path, nodes, read_plant(nodes["plant"], path))
+
+    @classmethod
+    def of(
+        cls, name: str, path: Path, nodes: Mapping[str, Mapping[str, Any]], plant: SimulatedPlant
+    ) -> Scenario:
+        """Return the scenario of one loop from what its nodes are told.
+
+        Args:
+            name: of the scenario.
+            path: of the file, to which file names are relative.
+            nodes: parameters by node name.
+            plant: what is simulated.
+
+        Raises:
+            InputError: anything missing or wrong, in one line.
+        """
+        model = plant.model
         checked: dict[str, Any] = {
-            name: settings_from_mapping(NODE_SETTINGS[name], values, f"{path}: {name}")
-            for name, values in nodes.items()
+            node: settings_from_mapping(NODE_SETTINGS[node], nodes[node], f"{path}: {node}")
+            for node in ("controller", "estimator")
         }
-        plant, controller = checked["plant"], checked["controller"]
-        if plant.samples < 1 or not plant.set_points:
-            raise InputError("a scenario needs samples ≥ 1 and set_points", where=f"{path}: plant")
-        model = LoopModel.load(path.parent / plant.model)
+        controller = checked["controller"]
         process = LoopModel.load(path.parent / controller.model)
         if (process.valve_names, process.outputs) != (model.valve_names, model.outputs):
             raise InputError(
@@ -171,21 +226,19 @@ class Scenario:
         except InputError as error:
             raise error.within(str(path)) from None
         return cls(
-            path.name.split(".")[0],
+            name,
             path,
             nodes,
             model,
             process,
-            SetPoints.load(path.parent / plant.set_points, model.outputs),
+            plant.set_points,
             plant.seed,
             plant.samples,
             controller,
             checked["estimator"],
             checked["estimator"],
             watched,
-            read_valve_changes(
-                plant.valve_changes, model.valve_names, f"{path}: plant: valve_changes"
-            ),
+            plant.valve_changes,
         )
 
 
@@ -225,7 +278,7 @@ class LiveRun:
         return next((c for c in self.changes if c.mode in aware and c.sample > 0), None)
 
 
-class _Loop:
+class LoopSession:
     """Controller and estimator behind the plain face that a simulated loop calls."""
 
     def __init__(self, scenario: Scenario, plant: LoopModel, identify: bool) -> None:
@@ -274,6 +327,12 @@ class _Loop:
         if update.loop_model is not None:
             self.controller.offer(update.loop_model, self._sample + self._latency)
 
+    def told(self, run: ClosedLoopRun) -> LiveRun:
+        """Return what has happened so far, with the signals of ``run``."""
+        changes = tuple(self.controller.changes)
+        noted = tuple(self.fits), tuple(self.looks), tuple(self.findings)
+        return LiveRun(run, np.array(self.stems), changes, *noted)
+
 
 def run_live(
     scenario: Scenario,
@@ -307,7 +366,7 @@ def run_live(
         ((60, 1), None)
     """
     plant = scenario.plant.with_ideal_valves() if ideal_valves else scenario.plant
-    loop = _Loop(scenario, plant, identify)
+    loop = LoopSession(scenario, plant, identify)
     run = simulate_closed_loop(
         plant,
         loop,
@@ -317,11 +376,4 @@ def run_live(
         progress,
         () if ideal_valves else scenario.valve_changes,
     )
-    return LiveRun(
-        run,
-        np.array(loop.stems),
-        tuple(loop.controller.changes),
-        tuple(loop.fits),
-        tuple(loop.looks),
-        tuple(loop.findings),
-    )
+    return loop.told(run)

@@ -17,7 +17,11 @@ from stiction_ros.loop import LoopModel, ValveChange
 from stiction_ros.online.estimator.friction_change import ChangeStatus
 from stiction_ros.online.session import Scenario, run_live
 
-SCENARIOS = sorted(config_directories()[0].glob("*.scenario.yaml"))
+SCENARIOS = sorted(
+    path
+    for path in config_directories()[0].glob("*.scenario.yaml")
+    if path.name.partition(".")[0] not in ("neighbours", "cascade")
+)
 
 
 @pytest.fixture(scope="module")

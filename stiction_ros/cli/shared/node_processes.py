@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.shared.scenarios import STARTED, write_parameters
+from stiction_ros.cli.shared.scenarios import STARTED, in_order, kind_of, write_parameters
 from stiction_ros.config_files import config_directories
 from stiction_ros.errors import InputError
 from stiction_ros.orphans import DIE_WITH_PARENT
@@ -35,7 +35,7 @@ class NodeProcesses:
     def __init__(self, nodes: Mapping[str, Mapping[str, Any]], directory: Path) -> None:
         """Write ``directory``/parameters.yaml and prepare logs; :meth:`start` starts."""
         self.directory = directory
-        self._names = [name for name in (*STARTED, "opcua") if name in nodes]
+        self._names = in_order(nodes, (*STARTED, "opcua"))
         self._parameters = directory / "parameters.yaml"
         write_parameters(nodes, self._parameters)
         self._processes: dict[str, subprocess.Popen[str]] = {}
@@ -50,9 +50,11 @@ class NodeProcesses:
         environment = ros_environment()
         (self.directory / "log").mkdir(exist_ok=True)
         for name in self._names:
-            command = [sys.executable, "-P", "-m", "stiction_ros.nodes", name, "--ros-args"]
+            command = [sys.executable, "-P", "-m", "stiction_ros.nodes", kind_of(name)]
+            command += ["--ros-args", "--params-file", str(self._parameters)]
+            space = name.rpartition("/")[0]
             process = subprocess.Popen(
-                [*command, "--params-file", str(self._parameters)],
+                [*command, "-r", f"__ns:=/{space}"] if space else command,
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
@@ -104,10 +106,8 @@ class NodeProcesses:
 
     def stop(self) -> None:
         """End every node, in an order in which nobody's last message is lost."""
-        for name in ENDED:
-            process = self._processes.get(name)
-            if process is None:
-                continue
+        for name in in_order(self._processes, ENDED):
+            process = self._processes[name]
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
                 try:
@@ -126,7 +126,7 @@ class NodeProcesses:
 
     def _read(self, name: str, process: subprocess.Popen[str]) -> None:
         assert process.stdout is not None
-        with (self.directory / "log" / f"{name}.log").open(
+        with (self.directory / "log" / f"{name.replace('/', '_')}.log").open(
             "w", encoding="utf-8", buffering=1
         ) as log:
             for line in process.stdout:

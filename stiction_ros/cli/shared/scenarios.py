@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 
 SCENARIOS = ("tank", "siso")  # those that are run where none is named
-ALL = (*SCENARIOS, "siso_test", "tank_test")
+ALL = (*SCENARIOS, "siso_test", "tank_test", "neighbours", "cascade")
 STARTED = ("recorder", "estimator", "controller", "plant")  # in this order
 
 
@@ -30,9 +30,9 @@ def find(name: str) -> Path:
 
 def node_parameters(path: Path, directory: Path) -> dict[str, dict[str, Any]]:
     """Return the parameters of all nodes with full paths; the bag goes below ``directory``."""
-    from stiction_ros.online.session import Scenario
+    from stiction_ros.online.unit import load_scenario
 
-    return _placed(Scenario.load(path).nodes, path, directory)
+    return _placed(load_scenario(path).nodes, path, directory)
 
 
 def _placed(
@@ -55,9 +55,19 @@ def loop_nodes(
     if seed is not None:
         nodes["plant"]["seed"] = seed
     if speed is not None:
-        for name in ("plant", "controller", "estimator"):
+        for name in nodes.keys() - {"recorder"}:
             nodes[name].update(pace="realtime", speed=float(speed))
-    return {name: nodes[name] for name in STARTED}
+    return {name: nodes[name] for name in in_order(nodes, STARTED)}
+
+
+def kind_of(name: str) -> str:
+    """Return what a node is that may be in a namespace: ``controller`` of ``TC1/controller``."""
+    return name.rpartition("/")[2]
+
+
+def in_order(names: Iterable[str], kinds: Sequence[str]) -> list[str]:
+    """Return names of nodes in the order of their kinds."""
+    return sorted(names, key=lambda name: kinds.index(kind_of(name)))
 
 
 def bridged_nodes(
@@ -81,6 +91,6 @@ def write_parameters(
     nodes: Mapping[str, Mapping[str, Any]], path: Path, *, any_namespace: bool = False
 ) -> None:
     """Write a ROS parameter file for ``nodes``, which may be in a namespace."""
-    prefix = "/**/" if any_namespace else ""
+    prefix = "/**/" if any_namespace else "/"
     document = {f"{prefix}{n}": {"ros__parameters": dict(v)} for n, v in nodes.items()}
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")

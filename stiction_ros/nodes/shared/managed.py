@@ -23,7 +23,7 @@ from stiction_ros import __version__
 from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared import parameters
 from stiction_ros.nodes.shared.messages import status, to_stamp
-from stiction_ros.nodes.shared.peers import Inlet, Outlet, Patience, Peers
+from stiction_ros.nodes.shared.peers import Inlet, Outlet, Patience, Peers, known_as
 from stiction_ros.nodes.shared.typed import Log, log_of, quality
 from stiction_ros.online.health import LEVELS, Noticed
 from stiction_ros.settings import changed
@@ -258,7 +258,7 @@ class ManagedNode(LifecycleNode):
 
     def partner_lost(self, name: str, what: str) -> None:
         """React to a partner in lockstep that has gone or was replaced: end with the plant."""
-        if name == "plant":
+        if known_as(name) == "plant":
             self.log.info(f"{name} {what}: the run is over")
             self.running, self.finished = False, True
 

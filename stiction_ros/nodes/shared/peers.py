@@ -12,6 +12,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
+ABOVE = "../"  # before the name of a node that is in the namespace above
 TOPIC = "topic:"  # marks an entry of wait_for that names a topic; "/" and "~" do as well
 PATIENCE = 0.5  # s for readers to receive
 GRACE = 0.5  # s for which a partner may be missing before it has gone
@@ -108,6 +109,9 @@ class Inlet:
 class Peers:
     """What ``wait_for`` asks: nodes of this package, which announce themselves, and topics.
 
+    A node is in the same namespace, in one below (``TC1/controller``) or in the one above
+    (``../plant``).
+
     A node is ready when it has announced ``~/config``, and linked when its topics have
     matched in both directions. A topic is there when a publisher of it (or, where this node
     publishes it, a reader other than the recorder) has matched, whatever its name: so a relay
@@ -137,7 +141,7 @@ class Peers:
             missing += [
                 known.get(name) or f"{name} (does not publish {topic})"
                 for name in self.names
-                if name in inlet.writers and name not in names
+                if known_as(name) in inlet.writers and _last(name) not in names
             ]
             usable = [i for i in found if _fit(i.qos_profile, inlet.qos)]
             if inlet.subscription.get_publisher_count() < len(usable):
@@ -160,7 +164,7 @@ class Peers:
             missing += [
                 known.get(name) or f"{name} (does not read {topic})"
                 for name in self.names
-                if name in outlet.readers and name not in names
+                if known_as(name) in outlet.readers and _last(name) not in names
             ]
             usable = [i for i in found if _fit(outlet.qos, i.qos_profile)]
             if outlet.publisher.get_subscription_count() < len(usable):
@@ -197,14 +201,16 @@ class Peers:
 
     def _announced(self, name: str) -> frozenset[tuple[int, ...]]:
         """Return the identities of those that announce themselves under ``name``."""
-        namespace = self._node.get_namespace().rstrip("/")
-        found = self._node.get_publishers_info_by_topic(f"{namespace}/{name}/config")
-        return frozenset(tuple(i.endpoint_gid) for i in found if i.node_name == name)
+        space, name_there = self._node.get_namespace().rstrip("/"), known_as(name)
+        if name_there != name:
+            space = space.rpartition("/")[0]
+        found = self._node.get_publishers_info_by_topic(f"{space}/{name_there}/config")
+        return frozenset(tuple(i.endpoint_gid) for i in found if i.node_name == _last(name))
 
     def _present(self) -> dict[str, str]:
         """Return what to say of the partners that are not in the graph at all."""
         there = set(self._node.get_node_names())
-        return {name: f"{name} (no such node)" for name in self.names if name not in there}
+        return {n: f"{n} (no such node)" for n in self.names if _last(n) not in there}
 
     def _foreign_topics(self, own: Iterable[str]) -> list[str]:
         """Return the awaited topics that this node does not use and nobody publishes."""
@@ -221,6 +227,16 @@ def publishers_of(node: Node, topic: str) -> list[str]:
     """Return the full names of the nodes that publish a topic, as often as they do."""
     found = node.get_publishers_info_by_topic(node.resolve_topic_name(topic))
     return [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in found]
+
+
+def known_as(name: str) -> str:
+    """Return the name by which topics know the node of an entry of ``wait_for``."""
+    return name.removeprefix(ABOVE)
+
+
+def _last(name: str) -> str:
+    """Return the name of a node without its namespace."""
+    return name.rpartition("/")[2]
 
 
 def _is_topic(entry: str) -> bool:

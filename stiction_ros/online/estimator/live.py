@@ -16,6 +16,7 @@ from stiction_ros.identification import Identification, IdentificationOptions, O
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import AUTO
 from stiction_ros.loop import LoopModel
+from stiction_ros.loop.member_loops import is_set_point
 from stiction_ros.online.estimator.change_evidence import LEAST_ROWS, Evidence, Reference
 from stiction_ros.online.estimator.friction_change import (
     ChangeRule,
@@ -30,11 +31,11 @@ from stiction_ros.online.schedule import FitSchedule
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
 
-METHOD = "exact"  # a sliding window is fitted again and again, beside a loop that runs
+LAW_METHOD = "evidence"  # search that tells a law which is left open
+
+METHOD = "exact"  # search of the windows unless another is asked for, as it runs again and again
 
 LAWS = ("he", "kano", "choudhury", "xch", "semi_physical", AUTO)
-
-LAW_METHOD = "evidence"  # search that tells a law which is left open
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,6 +47,12 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
     input_order: int = setting(0, "n_b of the ARX model; 0 chooses by BIC", low=0, high=20)
     delay_low: int = setting(0, "smallest delay tried, samples", low=0)
     delay_high: int = setting(10, "largest delay tried, samples", low=0)
+    method: str = setting(
+        METHOD,
+        "search of the windows: exact takes the process at its word; evidence takes several times "
+        "as long and is not misled by what neighbours do to pv",
+        choices=(METHOD, LAW_METHOD),
+    )
     law: str = setting(
         "he",
         "friction law of the valves; auto asks each window, until friction is trusted, whether "
@@ -56,7 +63,7 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
     @property
     def methods(self) -> tuple[str, ...]:
         """The searches that fits take."""
-        return (LAW_METHOD, METHOD) if self.law == AUTO else (METHOD,)
+        return (LAW_METHOD, self.method) if self.law == AUTO else (self.method,)
 
     def options(self) -> IdentificationOptions:
         """Return the options of ``identify``; a law that has no steps is refused."""
@@ -71,7 +78,7 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
             output_order=self.output_order or None,
             input_order=self.input_order or None,
             delay=(self.delay_low, self.delay_high),
-            method=METHOD,
+            method=self.method,
             law=self.law,
             check_columns=False,
         )
@@ -214,6 +221,9 @@ class LiveEstimator:
         elif not self._young(end):
             kept = {n for n, f in self._trust.trusted.items() if not f.settled}
             kept |= {change.valve for change in changes if change.doubted}
+            kept |= {
+                name for name in self.valves if is_set_point(name)
+            }  # the inner loop's friction
             self._trust.update(found.valves, kept, {c.valve for c in changes if c.explained})
         trusted = dict(self._trust.trusted)
         if record is not None and not before and trusted and self._reference is None:

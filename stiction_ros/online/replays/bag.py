@@ -263,7 +263,7 @@ def _counted(
     diagnostics: Iterable[BagMessage], estimator: NodeConfig | None
 ) -> tuple[int, int] | None:
     """Return a stamp and the estimator's count of samples at it."""
-    name = "estimator" if estimator is None else estimator.node.rpartition("/")[2]
+    name = "estimator" if estimator is None else estimator.node.strip("/")
     for message in diagnostics:
         for status in message.message.status:
             if status.name != f"{name}: status":

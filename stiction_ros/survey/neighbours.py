@@ -1,0 +1,132 @@
+"""Loops that share a plant: which valve makes them cycle, and whom it disturbs.
+
+Each loop is judged as a survey judges it, and the groups of the survey say who cycles together and
+who is the likely source. What is added is said of neighbours alone: how far behind the source they
+are, and that serving its valve is what helps them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.intake.loop import Loop
+from stiction_ros.loop.member_loops import is_set_point
+from stiction_ros.records.record import Record
+from stiction_ros.survey.assess import assess
+from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.groups import Group, grouped
+from stiction_ros.survey.survey_options import SurveyOptions
+
+
+@dataclasses.dataclass(frozen=True)
+class Disturbed:
+    """A loop that cycles with a valve of another one.
+
+    Attributes:
+        name: of the loop.
+        by: name of the loop whose valve it is.
+        period: of the group, s.
+        behind: s from the beginning of a cycle of the source to that of this loop, at most half a
+            period either way; negative where this loop begins first.
+    """
+
+    name: str
+    by: str
+    period: float
+    behind: float
+
+    @property
+    def timing(self) -> str:
+        """How its cycle stands to that of the source, in words."""
+        side = "after" if self.behind > 0.0 else "before"
+        return (
+            f"it keeps the period of {self.period:.0f} s, and its cycles begin "
+            f"{abs(self.behind):.0f} s {side} those of {self.by}"
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Neighbours:
+    """What is said of the loops of one plant.
+
+    Attributes:
+        entries: of the survey, by the name of the loop.
+        groups: of the survey: loops that cycle together, the likely source first.
+        sources: valves to service, by the name of their loop.
+        disturbed: loops whose cycle comes from one of these valves.
+    """
+
+    entries: Mapping[str, Entry]
+    groups: tuple[Group, ...]
+    sources: Mapping[str, str]
+    disturbed: tuple[Disturbed, ...]
+
+    @property
+    def sentences(self) -> list[str]:
+        """What to do, and what becomes of whom; one sentence each."""
+        said = []
+        for loop, valve in self.sources.items():
+            others = [one for one in self.disturbed if one.by == loop]
+            together = f"{1 + len(others)} loops stop" if others else f"{loop} stops"
+            said.append(f"Service {valve} and {together} cycling.")
+            gone = self.entries[loop].evidence.get("loop_gone", 0.0)
+            said.append(
+                f"{loop}: {valve} sticks, and without its friction {100 * min(gone, 1.0):.0f} % of "
+                "the movement goes away."
+            )
+            said += [f"{one.name}: disturbed by {loop}; {one.timing}." for one in others]
+        return said or ["No valve is shown to make these loops cycle."]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the mapping for JSON."""
+        return {
+            "sources": dict(self.sources),
+            "disturbed": [dataclasses.asdict(one) for one in self.disturbed],
+            "groups": [dataclasses.asdict(group) for group in self.groups],
+            "loops": [entry.to_dict() for entry in self.entries.values()],
+            "sentences": self.sentences,
+        }
+
+
+def neighbours(records: Mapping[str, Record]) -> Neighbours:
+    """Judge the loops of one plant, each by its record, and tell who disturbs whom.
+
+    Args:
+        records: by the name of the loop, all of one stretch of time.
+    """
+    plain = SurveyOptions(gain=False, pages=False)
+    judged = [assess(Loop(name, (), (record,)), plain).entry for name, record in records.items()]
+    entries, groups = grouped(judged)
+    by_name = {entry.name: entry for entry in entries}
+    sources = {
+        entry.name: ", ".join(records[entry.name].valves)
+        for entry in entries
+        if entry.found and entry.cause == "valve" and not is_outer(records[entry.name])
+    }
+    disturbed = []
+    for group in groups:
+        source = next((name for name in group.names if name in sources), "")
+        disturbed += [
+            Disturbed(name, source, group.period, _behind(by_name[source], by_name[name]))
+            for name in group.names
+            if source and name not in sources
+        ]
+    return Neighbours(by_name, tuple(groups), sources, tuple(disturbed))
+
+
+def is_outer(record: Record) -> bool:
+    """Tell whether a loop moves set-points alone: a friction behind these is of an inner loop."""
+    return all(map(is_set_point, record.valves))
+
+
+def _behind(source: Entry, other: Entry) -> float:
+    """Return by how much the cycles of a loop begin after those of the source, s."""
+    ours, theirs = np.array(source.beats), np.array(other.beats)
+    inside = theirs[(theirs >= ours[0]) & (theirs <= ours[-1])]
+    turns = np.interp(inside, ours, np.arange(len(ours), dtype=float))
+    phase = float(np.angle(np.mean(np.exp(2j * np.pi * turns))) / (2.0 * np.pi))
+    return phase * float(np.median(np.diff(ours)))
