@@ -266,7 +266,7 @@ def _louder(task: Task, state: State) -> list[FoundEffect]:
         return found
     for i, declared in enumerate(declared_noise(state.base.run.model)):
         fit = state.base.noise[i]
-        if declared is None or not fit.enlarged or _slowed(state, i):
+        if declared is None or not fit.enlarged:
             continue
         if not _matters(task, state, i):
             continue
@@ -276,12 +276,6 @@ def _louder(task: Task, state: State) -> list[FoundEffect]:
             own = state.base.under_declared(i)
             found.append(of_noise(laws, own.bic(0) + own.held_minus_two_log, task.options.margin))
     return found
-
-
-def _slowed(state: State, output: int) -> bool:
-    """Tell whether beside an effect the declared noise is left, which may have passed its lag."""
-    fits = [effect.fit.noise for effect in state.added]
-    return any(output in noise and not noise[output].enlarged for noise in fits)
 
 
 def _stranger(state: State, law: NoiseEffect) -> float:
