@@ -286,9 +286,14 @@ def lasts(candidate: Candidate, point: FloatArray) -> bool:
     return float(point[0]) >= LEAST_LAG * candidate.axes[0].low
 
 
+QUARTER = 0.25
+"""Sample: a stem moves on within one. What counts is its mean: that of its end, where it moves at
+once, to that of its middle, where it moves evenly."""
+
+
 def late_axes(asked: bool) -> tuple[Axis, ...]:
     """Return the axis of how late within a sample a lag moves on; none where that is not asked."""
-    return (Axis(-1.0, 1.0, 1, linear=True),) if asked else ()
+    return (Axis(-QUARTER, QUARTER, 1, linear=True),) if asked else ()
 
 
 def later(values: FloatArray, late: FloatArray, run: FreeRun) -> FloatArray:
@@ -296,13 +301,18 @@ def later(values: FloatArray, late: FloatArray, run: FreeRun) -> FloatArray:
 
     Args:
         values: shape (N, G).
-        late: samples, shape (G, 1); shape (G, 0) where that is not asked.
+        late: samples beyond a quarter, shape (G, 1); shape (G, 0) where that is not asked.
         run: whose records they are of.
     """
     for share in late.T:
         for rows in run.runs.slices:
-            values[rows][1:] -= share * np.diff(values[rows], axis=0)
+            values[rows][1:] -= (QUARTER + share) * np.diff(values[rows], axis=0)
     return values
+
+
+def figures_of_lag(point: FloatArray) -> int:
+    """Return how many figures a lag has that count: not where it begins, but how late it moves."""
+    return max(len(point) - 1, 1)
 
 
 def lag_axis(run: FreeRun) -> Axis:

@@ -22,7 +22,7 @@ from stiction_ros.discrepancy.answer.results import Discrepancy
 from stiction_ros.discrepancy.answer.say import LEFT, called, experiment_for, overall, reason_for
 from stiction_ros.discrepancy.answer.stem_words import look_at_stems
 from stiction_ros.discrepancy.candidate.base import figures_of
-from stiction_ros.discrepancy.decision.decide import SURE, GapVerdict, on_the_way
+from stiction_ros.discrepancy.decision.decide import SURE, GapVerdict, on_the_way, verdict_of
 from stiction_ros.discrepancy.decision.extend import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
@@ -214,7 +214,7 @@ def _effect(
             dated=effect.fit.candidate.dated,
             given=not task.options.process_fitted,
         ),
-        GapVerdict.AMBIGUOUS if effect.alternatives else GapVerdict.NAMED,
+        verdict_of(effect.effect, effect.alternatives),
         effect.alternatives,
         reason_for(effect, state.looks),
         moved_by(without, state.base),

@@ -58,9 +58,10 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
     The larger of two is found first, whichever it is: what a model that is off leaves
     behind every move looks like steps.
     """
-    if task.options.process_fitted or state.changes or not suspicious(state.base):
-        return None
     margin = task.options.margin
+    slower = any(fit.evidence >= margin for fit in scores.fits if fit.candidate.absorbed)
+    if task.options.process_fitted or state.changes or not (slower or suspicious(state.base)):
+        return None
     now = whole(state.bare, task.runs, state.added)
     found = with_process(state.given, task.runs, state.added, margin)
     inside = [fit for fit in scores.fits if fit.candidate.inside and fit.evidence > 0.0]
