@@ -12,10 +12,10 @@ import numpy as np
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Axis, Behaviour, FloatArray, Seen, about
 from stiction_ros.effects.behaviour import BoolArray
+from stiction_ros.signals.autoregression import TINY
 
 _RANKED = 200  # points of a grid that may be among the best ones
 _NEIGHBOURS = 1.5  # steps of the first grid
-_TINY = 1e-300
 
 
 @dataclasses.dataclass(frozen=True)
@@ -142,7 +142,7 @@ class Candidate(ABC):
             loss: shape (G,), the least is best.
             most: how many at most.
         """
-        steps = np.array([max(axis.spacing, _TINY) for axis in self.axes])
+        steps = np.array([max(axis.spacing, TINY) for axis in self.axes])
         chosen: list[int] = []
         for place in np.argsort(loss, kind="stable")[:_RANKED].tolist():
             away = [np.abs((coordinates[place] - coordinates[k]) / steps) for k in chosen]

@@ -157,7 +157,6 @@ def misfit(
 
 
 PROBE = 0.05  # of a linear axis, at which its parabola is taken
-_TINY = 1e-300
 
 
 def settled(
@@ -181,7 +180,7 @@ def settled(
         scores = [np.where(kept, score, 0.0) for score in scores]
         rows = sum(int(base.blocks[i].train.sum()) for i in response.outputs)
         low, middle, high = np.exp((np.array(scores) - np.min(scores, axis=0)) / max(rows, 1))
-        bend = np.maximum(low - 2.0 * middle + high, _TINY)
+        bend = np.maximum(low - 2.0 * middle + high, TINY)
         vertex = np.clip(0.5 * PROBE * (low - high), -bend, bend) / bend
         moved[:, d] = np.where(kept, vertex * axis.high, coordinates[:, d])
     return moved

@@ -35,7 +35,7 @@ def slow_beside_white(residual: FloatArray, rows: BoolArray) -> FloatArray:
         rows: whose innovations count, shape (N,).
     """
     _, keep, forget = min(_searched(residual, rows, *start) for start in BEGUN)
-    return counting((keep - forget) * forget ** np.arange(REMEMBERED))
+    return counting(np.asarray((keep - forget) * forget ** np.arange(REMEMBERED), dtype=float))
 
 
 @compiled
