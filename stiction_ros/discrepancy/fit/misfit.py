@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.likelihood.kernels import whitened_block
-from stiction_ros.discrepancy.likelihood.noise import Blocks, left_by
+from stiction_ros.discrepancy.likelihood.noise import left_by
 from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
 from stiction_ros.signals.autoregression import TINY, inner_product, whiten
 
@@ -117,21 +117,8 @@ def taken_by_sizes(
     return taken
 
 
-class Shared(Protocol):
-    """What every fit of one gap shares: a :class:`~.baseline.Baseline`."""
-
-    def basis(self, output: int, ar: FloatArray) -> FloatArray:
-        """Return an orthonormal basis of the columns that every fit projects out, shape (n, r)."""
-        ...
-
-    @property
-    def blocks(self) -> Sequence[Blocks]:
-        """Return per output the fitted and the held-out rows."""
-        ...
-
-
 def misfit(
-    base: Shared, gap: FloatArray, response: Response, ar: Mapping[int, FloatArray]
+    base: Baseline, gap: FloatArray, response: Response, ar: Mapping[int, FloatArray]
 ) -> FloatArray:
     """Return Σ n log(sum of squared innovations) for every point of a grid under given φ.
 

@@ -73,6 +73,7 @@ class NoiseFit:
         held_rows: their number.
         price: what its φ cost in BIC; nothing for those that the model declares.
         enlarged: whether it is another noise than the one that the model declares.
+        short: φ of the autoregression that it is better than; None where it is one itself.
     """
 
     ar: FloatArray
@@ -85,6 +86,12 @@ class NoiseFit:
     held_rows: int
     price: float
     enlarged: bool = False
+    short: FloatArray | None = None
+
+    @property
+    def searched(self) -> FloatArray:
+        """φ under which points of a search are compared, of six terms at most where it is found."""
+        return self.ar if self.short is None else self.short
 
     @property
     def innovations(self) -> FloatArray:
@@ -146,7 +153,8 @@ def _remembering(
     for _ in range(NOISE_FIT_ROUNDS):
         ar = slow_beside_white(best.residual, blocks.train)
         left = given_noise(target, columns, blocks, ar)
-        left = dataclasses.replace(left, price=2.0 * math.log(max(left.rows, 2)))
+        price = 2.0 * math.log(max(left.rows, 2))
+        left = dataclasses.replace(left, price=price, short=short.ar)
         if left.bic(0) >= best.bic(0) - SETTLED:
             break
         best = left

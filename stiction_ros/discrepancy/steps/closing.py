@@ -56,12 +56,7 @@ CLOSES = 0.2  # of the excess of the free run that an effect has to close by its
 
 
 def closing(task: Task, looked: State) -> Discrepancy:
-    """Return the answer: what holds as a name, and everything that belongs to it.
-
-    Args:
-        task: what the run was given.
-        looked: what is believed after the last step.
-    """
+    """Return the answer: what holds as a name, and everything that belongs to it."""
     state, found = _named(task, looked)
     if not explained(state):
         assert state.doubted is not None
@@ -189,16 +184,10 @@ def _effect(
     without: Baseline,
     beside: list[FloatArray],
 ) -> FoundEffect:
-    """Return what is told of the k-th effect.
+    """Return what is told of the k-th effect, ``without`` which is the model with all others.
 
-    Args:
-        task: what the run was given.
-        state: what is believed.
-        k: which effect.
-        effect: the same.
-        without: the model with all others.
-        beside: per output what all others, and what of the process was changed, would do by other
-            figures, shape (N, q).
+    ``beside`` is per output what all others, and what of the process was changed, would do by other
+    figures, shape (N, q).
     """
     return FoundEffect(
         effect.place,

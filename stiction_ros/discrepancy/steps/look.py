@@ -137,13 +137,7 @@ def withdrawn(task: Task, state: State) -> State:
 
 
 def scored_by(task: Task, state: State, k: int) -> Scores:
-    """Score every candidate against the model as it is now.
-
-    Args:
-        task: what the run was given.
-        state: what is believed.
-        k: how many looks there were, for the progress.
-    """
+    """Score every candidate against the model as it is after k looks."""
     share = 1.0 / (task.options.most_effects + 1)
     base, fitted = state.base, task.options.process_fitted
     if state.added or fitted:

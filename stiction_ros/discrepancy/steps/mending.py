@@ -84,16 +84,7 @@ def changed_again(task: Task, state: State) -> State:
 
 
 def made_room(task: Task, state: State, new: AddedEffect) -> tuple[State, AddedEffect]:
-    """Return the state with the changes of its process fitted beside one effect more.
-
-    Args:
-        task: what the run was given.
-        state: what is believed without the effect.
-        new: the effect.
-
-    Returns:
-        The state without the effect, and the effect behind its process.
-    """
+    """Return the state without a new effect, and the effect; its process changed beside both."""
     found = _fitted_again(task, state, (*state.added, new))
     if found is None:
         return state, new
