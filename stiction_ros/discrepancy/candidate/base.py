@@ -287,8 +287,7 @@ def lasts(candidate: Candidate, point: FloatArray) -> bool:
 
 
 QUARTER = 0.25
-"""Sample: a stem moves on within one. What counts is its mean: that of its end, where it moves at
-once, to that of its middle, where it moves evenly."""
+"""Sample: what counts of a stem is its mean within one, from its end (a jump) to its middle."""
 
 
 def late_axes(asked: bool) -> tuple[Axis, ...]:
