@@ -17,6 +17,7 @@ from stiction_ros.signals.arx import lagged
 
 LOAD = 1e-8  # of the noise's variance, that keeps its equations regular
 TINY = 1e-300
+TINY_POWER = 1e-9  # of a noise, that is forgotten
 _TRACE_SHARE = 1e-12
 
 
@@ -181,7 +182,9 @@ def gain_of_noise(ar: FloatArray) -> float:
     states = companion(ar)
     if np.abs(np.linalg.eigvals(states)).max() >= 1.0 - 1e-9:
         return math.inf
-    start = np.zeros((order, order))
-    start[0, 0] = 1.0
-    flat = np.linalg.solve(np.eye(order**2) - np.kron(states.T, states.T), start.ravel())
-    return float(flat[0])
+    total, passed = np.zeros((order, order)), states.T
+    total[0, 0] = 1.0
+    while np.abs(passed).max() > TINY_POWER:  # twice as many samples with every turn
+        total += passed @ total @ passed.T
+        passed = passed @ passed
+    return float(total[0, 0])

@@ -116,7 +116,7 @@ def reason_for(effect: AddedEffect, looks: Sequence[Look]) -> str:
 def called(place: str, effect: str, law: str | None = None) -> str:
     """Return an effect for people, such as ``stiction (he) of valve V1``."""
     kind, _, tag = place.partition(":")
-    effect = effect.replace("_", " ") + (f" ({law})" if law else "")
+    effect = effect.replace("_", " ").replace("pole", "pole (order)") + (f" ({law})" if law else "")
     words = {
         "valve": f"{effect} of valve {tag}",
         "load": f"{effect} of the load at {tag}",

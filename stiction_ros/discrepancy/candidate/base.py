@@ -12,10 +12,10 @@ import numpy as np
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Axis, Behaviour, FloatArray, Seen, about
 from stiction_ros.effects.behaviour import BoolArray
+from stiction_ros.signals.autoregression import TINY
 
 _RANKED = 200  # points of a grid that may be among the best ones
 _NEIGHBOURS = 1.5  # steps of the first grid
-_TINY = 1e-300
 
 
 @dataclasses.dataclass(frozen=True)
@@ -142,7 +142,7 @@ class Candidate(ABC):
             loss: shape (G,), the least is best.
             most: how many at most.
         """
-        steps = np.array([max(axis.spacing, _TINY) for axis in self.axes])
+        steps = np.array([max(axis.spacing, TINY) for axis in self.axes])
         chosen: list[int] = []
         for place in np.argsort(loss, kind="stable")[:_RANKED].tolist():
             away = [np.abs((coordinates[place] - coordinates[k]) / steps) for k in chosen]
@@ -286,9 +286,13 @@ def lasts(candidate: Candidate, point: FloatArray) -> bool:
     return float(point[0]) >= LEAST_LAG * candidate.axes[0].low
 
 
+QUARTER = 0.25
+"""Sample: what counts of a stem is its mean within one, from its end (a jump) to its middle."""
+
+
 def late_axes(asked: bool) -> tuple[Axis, ...]:
     """Return the axis of how late within a sample a lag moves on; none where that is not asked."""
-    return (Axis(-1.0, 1.0, 1, linear=True),) if asked else ()
+    return (Axis(-QUARTER, QUARTER, 1, linear=True),) if asked else ()
 
 
 def later(values: FloatArray, late: FloatArray, run: FreeRun) -> FloatArray:
@@ -296,13 +300,18 @@ def later(values: FloatArray, late: FloatArray, run: FreeRun) -> FloatArray:
 
     Args:
         values: shape (N, G).
-        late: samples, shape (G, 1); shape (G, 0) where that is not asked.
+        late: samples beyond a quarter, shape (G, 1); shape (G, 0) where that is not asked.
         run: whose records they are of.
     """
     for share in late.T:
         for rows in run.runs.slices:
-            values[rows][1:] -= share * np.diff(values[rows], axis=0)
+            values[rows][1:] -= (QUARTER + share) * np.diff(values[rows], axis=0)
     return values
+
+
+def figures_of_lag(point: FloatArray) -> int:
+    """Return how many figures a lag has that count: not where it begins, but how late it moves."""
+    return max(len(point) - 1, 1)
 
 
 def lag_axis(run: FreeRun) -> Axis:

@@ -11,6 +11,7 @@ import numpy as np
 from stiction_ros.discrepancy.candidate.base import (
     Candidate,
     Response,
+    figures_of_lag,
     lag_axis,
     lasts,
     late_axes,
@@ -105,7 +106,7 @@ class PoleCandidate(FilterCandidate):
         return later(values, points[:, 2:], run)
 
     def count(self, point: FloatArray) -> int:
-        return 1
+        return figures_of_lag(point)
 
     def keeps(self, run: FreeRun, point: FloatArray) -> float | None:
         return math.exp(-run.runs.sample_time / max(float(point[0]), 1e-9))

@@ -12,6 +12,7 @@ import numpy as np
 from stiction_ros.discrepancy.candidate.base import (
     Candidate,
     Response,
+    figures_of_lag,
     lag_axis,
     lasts,
     late_axes,
@@ -205,6 +206,9 @@ class BacklashCandidate(OneFigure):
 
 class LagCandidate(OneFigure):
     """A lag by its time constant, the place of the stem at the start, and how late it moves."""
+
+    def count(self, point: FloatArray) -> int:
+        return figures_of_lag(point)
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
         return lasts(self, point)

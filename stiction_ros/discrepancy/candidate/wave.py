@@ -17,7 +17,7 @@ from stiction_ros.discrepancy.candidate.waves import (
     Wave,
 )
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, left_by, projector
-from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.discrepancy.simulation.free_run import SMALL, FreeRun
 from stiction_ros.effects import (
     Behaviour,
     FloatArray,
@@ -26,12 +26,11 @@ from stiction_ros.effects import (
     TriangleDisturbance,
     about,
 )
+from stiction_ros.signals.autoregression import TINY
 
 PEAKS, STANDING_OUT = 6, 3
 NEIGHBOURS = 51  # frequencies, half a spectral line apart, whose median a line is held against
 SURPRISES = 12
-_TINY = 1e-300
-SMALL = 0.01  # %, of a wave by which a process that is not linear is asked for its slope
 SAME = 1e-3  # of a wave's length, that another one and the start of the record may leave of it
 
 # What no record of OP and PV tells from a disturbance of an output, or from a load.
@@ -212,7 +211,7 @@ def spectral_lines(values: list[FloatArray], lowest: float) -> FloatArray:
         power = np.abs(np.fft.rfft(each - each.mean(), 2 * len(each))) ** 2
         frequency = np.arange(len(power)) / (2.0 * len(each))
         outside = (frequency < lowest) | (frequency > FASTEST)
-        beside = np.maximum(median_filter(power, NEIGHBOURS, mode="nearest"), _TINY)
+        beside = np.maximum(median_filter(power, NEIGHBOURS, mode="nearest"), TINY)
         for sizes, count in ((power, PEAKS), (power / beside, STANDING_OUT)):
             sizes[outside] = 0.0
             for _ in range(count):

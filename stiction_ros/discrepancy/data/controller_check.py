@@ -13,7 +13,6 @@ from stiction_ros.discrepancy.data.scans import (
     Scans,
     errors_of,
     law_terms,
-    rather_twice,
     scanned_twice,
 )
 from stiction_ros.discrepancy.data.set_point import NORMAL_OF_MEDIAN, told_set_points
@@ -63,7 +62,7 @@ class ControllerCheck:
         scans: of a controller that scans twice in a sample of the record; None of one that does
             not, or whose OP between the samples is not told.
         unsure: how far OP is off that was told by a law whose SP was not recorded.
-        between: whether OP may be another between the samples, as far as rounded values tell.
+        between: whether OP is rounded and no tuning known: it may be another between the samples.
     """
 
     status: ControllerStatus
@@ -172,8 +171,7 @@ def _asked(model: LoopModel, runs: Runs) -> ControllerCheck:
     quantum = quantum_of(runs.op[:, 0])
     if not same or quantum <= 0.0:
         return check
-    known = model.controller
-    return dataclasses.replace(check, between=known is None or rather_twice(model, runs, known))
+    return dataclasses.replace(check, between=model.controller is None)
 
 
 def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
-from stiction_ros.loop import LoopModel, PiTuning
+from stiction_ros.loop import LoopModel
 
 LIKE_PV = (0.15, 2.0)  # times the spread of PV about its neighbours; a quarter where it is smooth
 USUAL = 6.0  # times the usual change of the error, beyond which SP has moved
 ROWS = 50  # that are asked at least
-SURELY = 10.0  # −2 ln L by which two scans explain more than one
-_TINY = 1e-300
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,29 +74,6 @@ def scanned_twice(model: LoopModel, runs: Runs) -> Scans | None:
             ]
             return Scans(gain, gain * h / integral, np.concatenate(mean)[:, None])
     return None
-
-
-def rather_twice(model: LoopModel, runs: Runs, tuning: PiTuning) -> bool:
-    """Tell whether a known law that scans twice in a sample gives the moves of OP better than once.
-
-    Rounded values hide what its error was between two samples; that it was scanned there shows.
-
-    Args:
-        model: of a loop with one valve and one output.
-        runs: records with SP.
-        tuning: of the controller.
-    """
-    once, twice, count = 0.0, 0.0, 0
-    for part in _parts(model, runs):
-        change = np.diff(part.error)
-        usual = float(np.median(np.abs(change)))
-        asked = np.isfinite(part.moves) & _rests(part.error, USUAL * usual)
-        share = 0.5 * tuning.gain * runs.sample_time / tuning.integral_time
-        left = part.moves - tuning.gain * change - share * part.error[1:]
-        once += float(np.sum((left - share * part.error[1:])[asked] ** 2))
-        twice += float(np.sum((left - share * between_samples(part.error))[asked] ** 2))
-        count += int(asked.sum())
-    return once > 0.0 and count * math.log(once / max(twice, _TINY)) > SURELY
 
 
 def _parts(model: LoopModel, runs: Runs) -> list[_Part]:

@@ -158,12 +158,8 @@ def _law(
 ) -> tuple[float, float, float] | None:
     """Return K, I and the usual size of what they leave of the changes of s; None without a law.
 
-    Where no tuning is given the sum of sizes is least: jumps of SP are few and large.
-
-    Args:
-        parts: of all records.
-        tuning: of the controller, where it is known.
-        interval: between two scans, s.
+    Where no tuning is given the sum of sizes is least: jumps of SP are few and large. The interval
+    is that between two scans, s.
     """
     wanted = np.concatenate([np.diff(p.moves, prepend=0.0)[p.free] for p in parts])
     columns = np.vstack([-np.diff(p.columns, axis=0, prepend=p.columns[:1])[p.free] for p in parts])

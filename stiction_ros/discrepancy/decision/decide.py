@@ -111,6 +111,9 @@ def decide(
         and not _part(best, stranger)
     ):
         return _unknown(stranger, f"{best.candidate.name} explains less of the gap", lent)
+    if _lags(best):  # told as the order of the process, where nothing speaks for another place
+        orders = [f for f in kept if _lags(f) and f.candidate.place.startswith("process:")]
+        best = next((f for f in orders if _as_much(f, best)), best)
     best, family = friction_kind(best, ranked, departures)
     rivals = [
         f
@@ -219,8 +222,21 @@ def _lags(fit: CandidateFit) -> bool:
 
 def _as_well(fit: CandidateFit, best: CandidateFit) -> bool:
     """Tell whether the same effect at another place explains all of it, as a sine's load does."""
-    same = fit.candidate.effect == best.candidate.effect
-    return same and abs(best.evidence - fit.evidence) < EQUAL
+    return fit.candidate.effect == best.candidate.effect and _as_much(fit, best)
+
+
+def _as_much(fit: CandidateFit, best: CandidateFit) -> bool:
+    return abs(best.evidence - fit.evidence) < EQUAL
+
+
+def verdict_of(effect: str, alternatives: Sequence[tuple[str, str]]) -> GapVerdict:
+    """Return named for an effect without alternatives, or with the same law at other places.
+
+    A lag does the same to PV wherever it is on the way: what the model lacks is told.
+    """
+    lags = about(effect).family == LAGS
+    one_law = all(lags and about(name).family == LAGS for _, name in alternatives)
+    return GapVerdict.NAMED if one_law else GapVerdict.AMBIGUOUS
 
 
 def _same_family(one: CandidateFit, other: CandidateFit) -> bool:

@@ -71,7 +71,6 @@ def score_candidates(
     base: Baseline,
     candidates: tuple[Candidate, ...],
     progress: Progress | None = None,
-    gap: FloatArray | None = None,
     beside: Baseline | None = None,
 ) -> Scores:
     """Return the best figures and the score of every candidate.
@@ -80,15 +79,13 @@ def score_candidates(
         base: the current model.
         candidates: what is tried.
         progress: called with the share done.
-        gap: shape (N, p), what is to be explained; None for the recorded one.
         beside: the current model with figures of its process left open, which a curve is judged
             against; None where nothing of it was changed.
     """
-    gap = base.run.gap if gap is None else gap
     fits = []
     for k, candidate in enumerate(candidates):
         against = beside if beside is not None and candidate.curved else base
-        fits.append(fit_candidate(against, gap, candidate))
+        fits.append(fit_candidate(against, base.run.gap, candidate))
         if progress is not None:
             progress((k + 1) / len(candidates))
     fits.sort(key=lambda fit: -fit.delta_bic)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.likelihood.kernels import whitened_block
-from stiction_ros.discrepancy.likelihood.noise import Blocks, left_by
+from stiction_ros.discrepancy.likelihood.noise import left_by
 from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
 from stiction_ros.signals.autoregression import TINY, inner_product, whiten
 
@@ -117,21 +117,8 @@ def taken_by_sizes(
     return taken
 
 
-class Shared(Protocol):
-    """What every fit of one gap shares: a :class:`~.baseline.Baseline`."""
-
-    def basis(self, output: int, ar: FloatArray) -> FloatArray:
-        """Return an orthonormal basis of the columns that every fit projects out, shape (n, r)."""
-        ...
-
-    @property
-    def blocks(self) -> Sequence[Blocks]:
-        """Return per output the fitted and the held-out rows."""
-        ...
-
-
 def misfit(
-    base: Shared, gap: FloatArray, response: Response, ar: Mapping[int, FloatArray]
+    base: Baseline, gap: FloatArray, response: Response, ar: Mapping[int, FloatArray]
 ) -> FloatArray:
     """Return Σ n log(sum of squared innovations) for every point of a grid under given φ.
 
@@ -157,7 +144,6 @@ def misfit(
 
 
 PROBE = 0.05  # of a linear axis, at which its parabola is taken
-_TINY = 1e-300
 
 
 def settled(
@@ -181,7 +167,7 @@ def settled(
         scores = [np.where(kept, score, 0.0) for score in scores]
         rows = sum(int(base.blocks[i].train.sum()) for i in response.outputs)
         low, middle, high = np.exp((np.array(scores) - np.min(scores, axis=0)) / max(rows, 1))
-        bend = np.maximum(low - 2.0 * middle + high, _TINY)
+        bend = np.maximum(low - 2.0 * middle + high, TINY)
         vertex = np.clip(0.5 * PROBE * (low - high), -bend, bend) / bend
         moved[:, d] = np.where(kept, vertex * axis.high, coordinates[:, d])
     return moved

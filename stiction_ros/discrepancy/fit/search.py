@@ -150,7 +150,7 @@ class _Search:
         blurring += [plausible for _ in range(any(map(len, plausible.values())))]
         self.misfits = [(ar, misfit(self.base, self.gap, response, ar)) for ar in blurring]
         guesses: list[Under] = [
-            {i: self.base.noise[i].ar for i in response.outputs},
+            {i: self.base.noise[i].searched for i in response.outputs},
             dict.fromkeys(response.outputs, SLOW),
         ]
         leaders: dict[int, float] = {}
@@ -167,7 +167,7 @@ class _Search:
             if self.best() is before:  # its noise has been a guess
                 break
             before = self.best()
-            guesses = [{i: fit.ar for i, fit in before.noise.items()}]
+            guesses = [{i: fit.searched for i, fit in before.noise.items()}]
         order = sorted(leaders, key=lambda point: -leaders[point])
         return [grid[point] for point in order]
 
@@ -232,7 +232,7 @@ class _Search:
         for fit in self._valleys():
             values = self.candidate.along(fit.point, 2.0 * halton.random(ALONG) - 1.0)
             response = self.candidate.respond(self.base.run, values)
-            for ar in (NO_MEMORY, SLOWER, self.base.noise[0].ar):
+            for ar in (NO_MEMORY, SLOWER, self.base.noise[0].searched):
                 squares = misfit(self.base, self.gap, response, dict.fromkeys(response.outputs, ar))
                 for k in np.argsort(squares)[:LEADERS].tolist():
                     self.judge(values[k], response.pick(k))
@@ -294,7 +294,7 @@ class _Search:
     ) -> FloatArray:
         """Return the best of several points, each the best one under one guess of the noise."""
         fits = [
-            self._judge_best(values, response, {i: noise[i].ar for i in response.outputs})
+            self._judge_best(values, response, {i: noise[i].searched for i in response.outputs})
             for noise in guesses
         ]
         return max(fits, key=lambda fit: fit.delta_bic).point
@@ -309,9 +309,9 @@ class _Search:
         self, coordinates: FloatArray, like: CandidateFit | None = None, under: Under | None = None
     ) -> tuple[FloatArray, CandidateFit]:
         """Judge the point of a grid that is best under the noise of another fit, or a given one."""
-        ar = {i: noise.ar for i, noise in enumerate(self.base.noise)}
+        ar = {i: noise.searched for i, noise in enumerate(self.base.noise)}
         if like is not None:
-            ar |= {i: noise.ar for i, noise in like.noise.items()}
+            ar |= {i: noise.searched for i, noise in like.noise.items()}
         ar |= under or {}
         coordinates = settled(self.base, self.gap, self.candidate, coordinates, ar)
         values = self.candidate.values(coordinates)

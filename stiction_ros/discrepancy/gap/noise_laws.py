@@ -22,7 +22,7 @@ from stiction_ros.effects import (
 )
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.processes import AlteredProcess, ArxProcess
-from stiction_ros.signals.autoregression import companion
+from stiction_ros.signals.autoregression import TINY, companion
 from stiction_ros.signals.state_space import responses
 
 TIMES = (5.0, 30.0, 150.0)  # samples, of the first guesses of a coloured noise's memory
@@ -174,15 +174,12 @@ def declared_block(base: Baseline, output: int, declared: DeclaredNoise) -> Bloc
     count = len(declared.ar)
     if not count:
         return white_block(variance + rounding)
-    a, q = np.zeros((count, count)), np.zeros((count, count))
-    a[:, 0] = declared.ar
-    a[:-1, 1:] += np.eye(count - 1)
+    q = np.zeros((count, count))
     q[0, 0] = variance
-    return Block(a, q, np.eye(count)[0], q, FLOOR * variance + rounding)
+    return Block(companion(declared.ar), q, np.eye(count)[0], q, FLOOR * variance + rounding)
 
 
 CLOSE, FLAT, TURNS = 1e-2, 0.05, 60  # of the search: figures, their likelihood, turns
-_TINY = 1e-300
 
 
 @dataclasses.dataclass(frozen=True)
@@ -244,7 +241,7 @@ def score_of(
     if np.any(x < low) or np.any(x > high):
         return math.inf, 0.0, 0.0, 1.0
     block = law.block(x)
-    unit = max(own.r, float(np.trace(own.q)), _TINY)
+    unit = max(own.r, float(np.trace(own.q)), TINY)
     white, variances = innovations(
         block_diag(own.a, block.a),
         block_diag(own.q, block.q) / unit,
@@ -259,7 +256,7 @@ def score_of(
         return math.inf, 0.0, 0.0, 1.0
     left, logs = left_by_columns(white, shown.values, blocks.train, VANISHED), np.log(variances)
     inside, outside = left[blocks.train], left[blocks.held]
-    variance = max(float(inside @ inside) / len(inside), _TINY)
+    variance = max(float(inside @ inside) / len(inside), TINY)
     log = math.log(2.0 * math.pi * variance)
     outside = np.minimum(outside**2 / variance, SURPRISE**2)
     fitted = len(inside) * (log + 1.0) + float(logs[blocks.train].sum())

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 
 from stiction_ros.deferred import lfilter
+from stiction_ros.discrepancy.likelihood.slow_noise import NEGLIGIBLE
 from stiction_ros.discrepancy.likelihood.state_noise import steady_gain
 from stiction_ros.effects import ColouredDisturbance, FloatArray
 from stiction_ros.loop import LoopModel
@@ -15,7 +16,6 @@ from stiction_ros.processes import AlteredProcess, ArxProcess, NoiseEntry
 from stiction_ros.signals.autoregression import companion
 
 LONGEST = 20  # samples that an autoregression of declared noises reaches back
-NEGLIGIBLE = 0.01  # of φ
 UNSEEN = 1e-3  # of the variance of a noise, that rounding may add to it when it is whitened
 
 
@@ -83,15 +83,6 @@ def _beside_white(
     last = int(np.max(np.flatnonzero(np.abs(ar) > NEGLIGIBLE), initial=-1)) + 1
     variance = float(covariance[0] - ar @ covariance[1:])
     return DeclaredNoise(float(np.sqrt(max(variance, 0.0))), ar[:last])
-
-
-def counting(ar: FloatArray) -> FloatArray:
-    """Return φ without those at the end that together do not count.
-
-    A slow noise is remembered a little at each of many lags, which together are much.
-    """
-    rest = np.cumsum(np.abs(ar)[::-1])[::-1]
-    return ar[: int(np.sum(rest > NEGLIGIBLE))]
 
 
 def rounded(noise: DeclaredNoise, quantum: float) -> DeclaredNoise:

@@ -17,6 +17,7 @@ from stiction_ros.discrepancy.likelihood.kernels import (
     turn,
     whitened_block,
 )
+from stiction_ros.discrepancy.likelihood.slow_noise import slow_beside_white
 from stiction_ros.effects import FloatArray
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.signals.autoregression import (
@@ -31,6 +32,7 @@ MAX_ORDER = 6
 NOISE_FIT_ROUNDS = 4
 SURPRISE = 5.0  # standard deviations that one held-out row may count
 ENLARGED = 10.0  # BIC: noise beyond the declared one is an effect, and has to beat it as one
+SETTLED = 1e-3  # BIC
 VANISHED = 1e-9  # of a column, that whitening leaves of what it takes away
 
 
@@ -71,6 +73,7 @@ class NoiseFit:
         held_rows: their number.
         price: what its φ cost in BIC; nothing for those that the model declares.
         enlarged: whether it is another noise than the one that the model declares.
+        short: φ of the autoregression that it is better than; None where it is one itself.
     """
 
     ar: FloatArray
@@ -83,6 +86,12 @@ class NoiseFit:
     held_rows: int
     price: float
     enlarged: bool = False
+    short: FloatArray | None = None
+
+    @property
+    def searched(self) -> FloatArray:
+        """φ under which points of a search are compared, of six terms at most where it is found."""
+        return self.ar if self.short is None else self.short
 
     @property
     def innovations(self) -> FloatArray:
@@ -123,13 +132,33 @@ def fit_noise(
             beta = _solve(whiten(columns, ar)[train], whiten(target, ar)[train])
         residual = target - columns @ beta
         fitted, score = best_autoregression(residual, train, MAX_ORDER)
-        if best is not None and score >= best[0] - 1e-3:
+        if best is not None and score >= best[0] - SETTLED:
             break
         best = (score, beta, fitted)
         ar = fitted
     assert best is not None
     _, beta, ar = best
-    return _result(target - columns @ beta, beta, ar, blocks, own=True)
+    found = _result(target - columns @ beta, beta, ar, blocks, len(ar))
+    return found if len(ar) < MAX_ORDER else _remembering(target, columns, blocks, found)
+
+
+def _remembering(
+    target: FloatArray, columns: FloatArray, blocks: Blocks, short: NoiseFit
+) -> NoiseFit:
+    """Return the fit under white noise beside a first-order one, where that explains more.
+
+    An autoregression whose order is the highest ends before the noise forgets.
+    """
+    best = short
+    for _ in range(NOISE_FIT_ROUNDS):
+        ar = slow_beside_white(best.residual, blocks.train)
+        left = given_noise(target, columns, blocks, ar)
+        price = 2.0 * math.log(max(left.rows, 2))
+        left = dataclasses.replace(left, price=price, short=short.ar)
+        if left.bic(0) >= best.bic(0) - SETTLED:
+            break
+        best = left
+    return best
 
 
 def noise_forms(
@@ -182,9 +211,9 @@ def whitened_columns(columns: FloatArray, ar: FloatArray, rows: BoolArray) -> Fl
 
 
 def _result(
-    residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks, own: bool = False
+    residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks, count: int = 0
 ) -> NoiseFit:
-    """Return what a fit left; its φ cost something where they are its own."""
+    """Return what a fit left; ``count`` figures of its noise are its own and cost something."""
     rows, inside, held, outside = sums_of_squares(residual, ar, blocks.train, blocks.held, SURPRISE)
     variance = max(inside / max(rows, 1), TINY)
     log = math.log(2.0 * math.pi * variance)
@@ -197,7 +226,7 @@ def _result(
         rows,
         held * log + outside / variance,
         held,
-        len(ar) * math.log(max(rows, 2)) if own else 0.0,
+        count * math.log(max(rows, 2)),
     )
 
 

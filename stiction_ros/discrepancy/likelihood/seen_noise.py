@@ -9,20 +9,17 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from stiction_ros.discrepancy.likelihood.declared_noise import (
-    NEGLIGIBLE,
     UNSEEN,
     DeclaredNoise,
-    counting,
     declared_noise,
     rounded,
 )
+from stiction_ros.discrepancy.likelihood.slow_noise import NEGLIGIBLE, REMEMBERED, counting
 from stiction_ros.discrepancy.likelihood.state_noise import steady_gain
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess
 from stiction_ros.signals.autoregression import companion
-
-REMEMBERED = 60  # samples that an OP off its record is remembered behind the process
 
 
 @dataclasses.dataclass(frozen=True)

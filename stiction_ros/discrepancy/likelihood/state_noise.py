@@ -7,10 +7,10 @@ import numpy as np
 from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.likelihood.kernels import DEPENDENT
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
+from stiction_ros.signals.autoregression import TINY
 
 DOUBLINGS = 30
 STEADY = 1e-13  # of a gain and of a variance: what changes less from row to row stays
-_TINY = 1e-300
 
 
 def steady_gain(
@@ -143,7 +143,7 @@ def left_by_columns(
     left: FloatArray = white[0].copy()
     for g in range(1, len(white)):
         after, before = _length(white[g], rows), _length(values[g], rows)
-        if not after > vanished * max(before, _TINY):
+        if not after > vanished * max(before, TINY):
             continue
         column = white[g] / after
         for _ in range(2):  # twice is enough

@@ -127,13 +127,7 @@ def changed_process(
 
 
 def _stepped(effect: AddedEffect, run: FreeRun, more: float) -> AddedEffect:
-    """Return an effect with another first figure, inside of what is searched.
-
-    Args:
-        effect: smooth in that figure.
-        run: of the model behind which it stands.
-        more: in coordinates of its search.
-    """
+    """Return an effect with ``more`` of its first figure, in coordinates of its search."""
     candidate, point = effect.fit.candidate, effect.fit.point.copy()
     axis = candidate.axes[0]
     moved = axis.outer(np.array([axis.inner(float(point[0])) + more]))

@@ -113,9 +113,7 @@ class Runs:
         return len(self.op)
 
 
-def join_records(
-    model: LoopModel, records: Sequence[Record], usable: BoolArray | None = None
-) -> Runs:
+def join_records(model: LoopModel, records: Sequence[Record]) -> Runs:
     """Return the records end to end, signals in the order of the model.
 
     Raises:
@@ -135,8 +133,7 @@ def join_records(
     pv = np.vstack([r.pv[:, [r.outputs.index(o) for o in model.outputs]] for r in records])
     ends = np.cumsum([len(r) for r in records]).tolist()
     slices = tuple(slice(end - len(r), end) for r, end in zip(records, ends, strict=True))
-    if usable is None:
-        usable = np.ones((pv.shape[1], len(pv)), dtype=bool)
+    usable = np.ones((pv.shape[1], len(pv)), dtype=bool)
     low, high = model.limits.T
     time = np.concatenate([r.time for r in records])
     count = pv.shape[1]

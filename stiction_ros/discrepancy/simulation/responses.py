@@ -113,7 +113,7 @@ class LinearResponses(Responses):
         if isinstance(process, ArxProcess):
             self._numerators, self._denominators = _of_equations(process)
             self.skip = max(n.size for row in self._numerators for n in row)
-            self._rests = [_recursion_starts(d) for d in self._denominators]
+            self._rests = [list(np.eye(len(d) - 1)) for d in self._denominators]
         else:
             den = np.real(np.poly(model.a)) if model.order else np.ones(1)
             self._denominators = [den] * count
@@ -268,11 +268,6 @@ def _of_equations(process: ArxProcess) -> tuple[list[list[FloatArray]], list[Flo
         numerators.append(row)
         denominators.append(np.concatenate([[1.0], equation.a]))
     return numerators, denominators
-
-
-def _recursion_starts(denominator: FloatArray) -> list[FloatArray]:
-    """Return impulses at the first n_a samples: together they reach every past of an equation."""
-    return [np.eye(len(denominator) - 1)[i] for i in range(len(denominator) - 1)]
 
 
 def _numerator(

@@ -30,12 +30,6 @@ def begin(
 ) -> tuple[Task, State]:
     """Return what the other steps are given, and what is believed before the first look.
 
-    Args:
-        model: the loop as it is simulated now.
-        records: of this loop.
-        options: of the run.
-        progress: called with the share done; None for nobody.
-
     Raises:
         InputError: records that do not fit the model, or a model whose free run grows
             without bound.

@@ -22,7 +22,7 @@ from stiction_ros.discrepancy.answer.results import Discrepancy
 from stiction_ros.discrepancy.answer.say import LEFT, called, experiment_for, overall, reason_for
 from stiction_ros.discrepancy.answer.stem_words import look_at_stems
 from stiction_ros.discrepancy.candidate.base import figures_of
-from stiction_ros.discrepancy.decision.decide import SURE, GapVerdict, on_the_way
+from stiction_ros.discrepancy.decision.decide import SURE, GapVerdict, on_the_way, verdict_of
 from stiction_ros.discrepancy.decision.extend import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
@@ -56,12 +56,7 @@ CLOSES = 0.2  # of the excess of the free run that an effect has to close by its
 
 
 def closing(task: Task, looked: State) -> Discrepancy:
-    """Return the answer: what holds as a name, and everything that belongs to it.
-
-    Args:
-        task: what the run was given.
-        looked: what is believed after the last step.
-    """
+    """Return the answer: what holds as a name, and everything that belongs to it."""
     state, found = _named(task, looked)
     if not explained(state):
         assert state.doubted is not None
@@ -189,16 +184,10 @@ def _effect(
     without: Baseline,
     beside: list[FloatArray],
 ) -> FoundEffect:
-    """Return what is told of the k-th effect.
+    """Return what is told of the k-th effect, ``without`` which is the model with all others.
 
-    Args:
-        task: what the run was given.
-        state: what is believed.
-        k: which effect.
-        effect: the same.
-        without: the model with all others.
-        beside: per output what all others, and what of the process was changed, would do by other
-            figures, shape (N, q).
+    ``beside`` is per output what all others, and what of the process was changed, would do by other
+    figures, shape (N, q).
     """
     return FoundEffect(
         effect.place,
@@ -214,7 +203,7 @@ def _effect(
             dated=effect.fit.candidate.dated,
             given=not task.options.process_fitted,
         ),
-        GapVerdict.AMBIGUOUS if effect.alternatives else GapVerdict.NAMED,
+        verdict_of(effect.effect, effect.alternatives),
         effect.alternatives,
         reason_for(effect, state.looks),
         moved_by(without, state.base),
@@ -266,7 +255,7 @@ def _louder(task: Task, state: State) -> list[FoundEffect]:
         return found
     for i, declared in enumerate(declared_noise(state.base.run.model)):
         fit = state.base.noise[i]
-        if declared is None or not fit.enlarged or _slowed(state, i):
+        if declared is None or not fit.enlarged:
             continue
         if not _matters(task, state, i):
             continue
@@ -276,12 +265,6 @@ def _louder(task: Task, state: State) -> list[FoundEffect]:
             own = state.base.under_declared(i)
             found.append(of_noise(laws, own.bic(0) + own.held_minus_two_log, task.options.margin))
     return found
-
-
-def _slowed(state: State, output: int) -> bool:
-    """Tell whether beside an effect the declared noise is left, which may have passed its lag."""
-    fits = [effect.fit.noise for effect in state.added]
-    return any(output in noise and not noise[output].enlarged for noise in fits)
 
 
 def _stranger(state: State, law: NoiseEffect) -> float:

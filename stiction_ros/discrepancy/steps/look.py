@@ -8,7 +8,6 @@ from collections.abc import Callable
 import numpy as np
 
 from stiction_ros.discrepancy.answer.results import Look
-from stiction_ros.discrepancy.candidate.base import Candidate
 from stiction_ros.discrepancy.candidate.valve import departures
 from stiction_ros.discrepancy.decision.decide import (
     Decision,
@@ -60,19 +59,6 @@ MOVED_AWAY = "the free run of the held-out rows moves away from PV"
 """Why an effect is taken back that the looks had kept."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Scored:
-    """What the scores of a look leave.
-
-    Attributes:
-        candidates: that were tried.
-        scores: of all of them.
-    """
-
-    candidates: tuple[Candidate, ...]
-    scores: Scores
-
-
 def look_on(task: Task, state: State) -> State:
     """Look until nothing more is found; what takes the free run away from PV is taken back.
 
@@ -96,16 +82,15 @@ def look_on(task: Task, state: State) -> State:
 
 def look(task: Task, state: State, k: int) -> State:
     """Look for one effect more: the k-th, from 0."""
-    scored = scored_by(task, state, k)
-    scores = scored.scores
+    scores = scored_by(task, state, k)
     mended = process_first(task, state, scores)
     if mended is not None:
         return look(task, mended, k)
-    decision = decided(task, state, scored)
+    decision = decided(task, state, scores)
     room, bare, step = _extended(task, state, decision)
     kept, reason = (step.kept, step.reason) if step else (False, decision.reason)
     own = Look(scores, decision, locate(scores.base), kept, reason)
-    testable = testable_effects(scores.base, list(scored.candidates), task.options.margin)
+    testable = testable_effects(scores.base, list(scores.candidates), task.options.margin)
     doubted = state.doubted
     if kept:
         given_up = dataclasses.replace(own, kept=False, reason=decision.reason)
@@ -151,14 +136,8 @@ def withdrawn(task: Task, state: State) -> State:
     return before.with_added(task.runs, state.added[:-1])
 
 
-def scored_by(task: Task, state: State, k: int) -> Scored:
-    """Score every candidate against the model as it is now.
-
-    Args:
-        task: what the run was given.
-        state: what is believed.
-        k: how many looks there were, for the progress.
-    """
+def scored_by(task: Task, state: State, k: int) -> Scores:
+    """Score every candidate against the model as it is after k looks."""
     share = 1.0 / (task.options.most_effects + 1)
     base, fitted = state.base, task.options.process_fitted
     if state.added or fitted:
@@ -175,18 +154,18 @@ def scored_by(task: Task, state: State, k: int) -> Scored:
         task.report((k + SCORED * done) * share)
 
     beside = left_open(state.base, state.added, state.slopes) if state.slopes else None
-    return Scored(candidates, score_candidates(base, candidates, report, beside=beside))
+    return score_candidates(base, candidates, report, beside=beside)
 
 
-def decided(task: Task, state: State, scored: Scored) -> Decision:
+def decided(task: Task, state: State, scores: Scores) -> Decision:
     """Return what the scores allow to say.
 
     Values between those that were kept are none that were measured: all evidence counts by the
     share of the others. What would be an answer if all had been measured is not nothing.
     """
-    base = scored.scores.base
+    base = scores.base
     measured = 1.0 - min(max(task.runs.thinned), MOST_THINNED)
-    possible = not_contradicted(base.run, scored.scores.fits)
+    possible = not_contradicted(base.run, scores.fits)
     allowed = [fit for fit in possible if not told_already(state.added, fit)]
     margin, rests = task.options.margin, rests_left(base.run)
     decision = decide(allowed, margin / measured, rests)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 from stiction_ros.discrepancy.decision.decide import large_enough
 from stiction_ros.discrepancy.decision.extend import AddedEffect
@@ -58,9 +59,10 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
     The larger of two is found first, whichever it is: what a model that is off leaves
     behind every move looks like steps.
     """
-    if task.options.process_fitted or state.changes or not suspicious(state.base):
-        return None
     margin = task.options.margin
+    slower = any(fit.evidence >= margin for fit in scores.fits if fit.candidate.absorbed)
+    if task.options.process_fitted or state.changes or not (slower or suspicious(state.base)):
+        return None
     now = whole(state.bare, task.runs, state.added)
     found = with_process(state.given, task.runs, state.added, margin)
     inside = [fit for fit in scores.fits if fit.candidate.inside and fit.evidence > 0.0]
@@ -77,36 +79,31 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
 
 def changed_again(task: Task, state: State) -> State:
     """Fit the changes of the process again, if there are any, beside what was found since."""
-    if not state.changes:
-        return state
-    margin = task.options.margin
-    now = whole(state.bare, task.runs, state.added)
-    found = with_process(state.given, task.runs, state.added, margin)
-    if found is not None and found.worth < now.worth(margin) + _price(task, state, now):
-        return behind(state, found)
-    return state
+    found = _fitted_again(task, state, state.added)
+    return state if found is None else behind(state, found)
 
 
 def made_room(task: Task, state: State, new: AddedEffect) -> tuple[State, AddedEffect]:
-    """Return the state with the changes of its process fitted beside one effect more.
-
-    Args:
-        task: what the run was given.
-        state: what is believed without the effect.
-        new: the effect.
-
-    Returns:
-        The state without the effect, and the effect behind its process.
-    """
-    if not state.changes:
-        return state, new
-    effects, margin = (*state.added, new), task.options.margin
-    now = whole(state.bare, task.runs, effects)
-    found = with_process(state.given, task.runs, effects, margin)
-    if found is None or found.worth >= now.worth(margin) + _price(task, state, now):
+    """Return the state without a new effect, and the effect; its process changed beside both."""
+    found = _fitted_again(task, state, (*state.added, new))
+    if found is None:
         return state, new
     *others, last = found.whole.effects
     return dataclasses.replace(behind(state, found), added=tuple(others), base=state.base), last
+
+
+def _fitted_again(task: Task, state: State, effects: Sequence[AddedEffect]) -> Mended | None:
+    """Return the explanation by effects behind a process that is changed for them.
+
+    None where the process was not changed before, or is better as it is.
+    """
+    if not state.changes:
+        return None
+    margin = task.options.margin
+    now = whole(state.bare, task.runs, effects)
+    found = with_process(state.given, task.runs, effects, margin)
+    better = found is not None and found.worth < now.worth(margin) + _price(task, state, now)
+    return found if better else None
 
 
 def singles(state: State) -> list[AddedEffect]:

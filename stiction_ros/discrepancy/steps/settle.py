@@ -153,8 +153,8 @@ def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]
     """
     own = state.added[k].fit.candidate
     others = state.with_added(task.runs, state.others(k))
-    scored = scored_by(task, others, task.options.most_effects)
-    fits = not_contradicted(scored.scores.base.run, scored.scores.fits)
+    scores = scored_by(task, others, task.options.most_effects)
+    fits = not_contradicted(scores.base.run, scores.fits)
     mine = max((f.evidence for f in fits if f.candidate.key == own.key), default=0.0)
     twins = next((f.candidate.twins for f in fits if f.candidate.key == own.key), ())
     known = {own.key, *(each.fit.candidate.key for each in others.added)}

@@ -51,13 +51,7 @@ class Whole:
 
 
 def whole(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> Whole:
-    """Return the explanation by effects with their present figures.
-
-    Args:
-        bare: the model without any of them.
-        runs: the records.
-        effects: those of the explanation.
-    """
+    """Return the explanation by effects with their present figures, in a model without them."""
     base = base_with(bare, runs, effects)
     score = sum(fit.bic(0) + fit.held_minus_two_log for fit in base.noise)
     rows = max(fit.rows for fit in base.noise)
@@ -89,8 +83,7 @@ def best_whole(
     """Return the best of all subsets of what was found, and of single effects in its stead.
 
     Args:
-        bare: the model without any effect.
-        runs: the records.
+        bare, runs: the model without any effect, and the records.
         added: what was found, one after the other.
         singles: effects of the first look that may explain alone what took several.
         margin: that every further effect has to gain, beside a share of what all gain.
@@ -186,8 +179,7 @@ def best_with_process(
     """Return the best explanation with another process and all, one, or none of the effects.
 
     Args:
-        bare: the model without any effect.
-        runs: the records.
+        bare, runs: the model without any effect, and the records.
         added: what was found with the process as it is.
         singles: effects that may stand alone beside another process, though none was found.
         margin: that the changes together have to gain.
@@ -207,11 +199,7 @@ def with_process(
     It is changed under the declared noise and under the larger one that is found: what is there
     besides may be steps or a walk, and the one or the other shows the process.
 
-    Args:
-        bare: the model without any effect, its process as it was given.
-        runs: the records.
-        part: the effects.
-        margin: that the changes together have to gain.
+    The changes together have to gain the margin.
     """
     grounds = (True, False) if any(declared_noise(bare)) else (False,)
     found = [

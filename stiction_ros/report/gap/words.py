@@ -37,7 +37,7 @@ _SHORT = {
 _PLACE = re.compile(rf"\b({'|'.join(_SHORT)}):(\w+)")
 _FRICTION = re.compile(r"\bf_[sd]\b")
 _WORDS = {
-    "pole": "slower process",
+    "pole": "higher order",
     "bias_step": "step of the calibration",
     "random_walk": "random walk",
     "quantisation": "rounding",

@@ -14,6 +14,7 @@ from stiction_ros.discrepancy.decision.decide import (
     borne_out,
     decide,
     thinned_away,
+    verdict_of,
 )
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
@@ -137,6 +138,21 @@ def test_what_a_rival_outside_the_catalogue_beats_is_not_lent() -> None:
     assert said(refused, stranger, step).tried is None
     less = dataclasses.replace(stranger, delta_bic=100.0)
     assert said(refused, less, step).tried is refused
+
+
+def test_a_lag_is_named_wherever_it_is() -> None:
+    places = [("sensor:PV1", "lag"), ("valve:V1", "lag")]
+    assert verdict_of("pole", places) is GapVerdict.NAMED
+    assert verdict_of("pole", [*places, ("process:PV1", "delay")]) is GapVerdict.AMBIGUOUS
+    assert verdict_of("stiction", ()) is GapVerdict.NAMED
+    assert verdict_of("step", [("sensor:PV1", "bias_step")]) is GapVerdict.AMBIGUOUS
+
+
+def test_a_lag_that_nothing_places_is_the_order_of_the_process() -> None:
+    answer = said(fit("valve:V1", "lag", 90.3), fit("process:PV1", "pole", 90.0))
+    assert answer.chosen is not None
+    assert answer.chosen.candidate.key == ("process:PV1", "pole")
+    assert answer.alternatives == (("valve:V1", "lag"),)
 
 
 def test_a_clear_jump_is_stiction() -> None:
