@@ -55,21 +55,14 @@ Prior = tuple[int, int, int, int]
 
 @dataclasses.dataclass(frozen=True)
 class Answer:
-    """Equation of one output as the record tells it, signals scaled.
+    """Equation of one output as the record tells it, signals scaled."""
 
-    Attributes:
-        mean: of f, g of each valve, the constant and waves, shape (q,).
-        factor: Cholesky factor of the inverse covariance over the variance of ε, shape (q, q).
-        variance: of ε.
-        lags: n.
-        valves: m.
-    """
-
-    mean: FloatArray
+    mean: FloatArray  # of f, g of each valve, the constant and waves, shape (q,)
+    # Cholesky factor of the inverse covariance over the variance of ε, shape (q, q)
     factor: FloatArray
-    variance: float
-    lags: int
-    valves: int
+    variance: float  # of ε
+    lags: int  # n
+    valves: int  # m
 
     def drawn(self, random: np.random.Generator) -> FloatArray:
         """Return another equation that the record does not tell from this one, shape (q,)."""
@@ -84,21 +77,13 @@ class Answer:
 
 @dataclasses.dataclass(frozen=True)
 class Answering:
-    """One output to be explained by its past and by stems.
+    """One output to be explained by its past and by stems."""
 
-    Attributes:
-        pv: shape (N,).
-        delay: d_j, samples, shape (m,).
-        wave: sines and cosines of a wave from outside, shape (N, 2 H); H may be 0.
-        lags: n.
-        prior: that is used.
-    """
-
-    pv: FloatArray
-    delay: IntArray
-    wave: FloatArray
-    lags: int
-    prior: Prior = BEGUN
+    pv: FloatArray  # shape (N,)
+    delay: IntArray  # d_j, samples, shape (m,)
+    wave: FloatArray  # sines and cosines of a wave from outside, shape (N, 2 H); H may be 0
+    lags: int  # n
+    prior: Prior = BEGUN  # that is used
 
     @classmethod
     def of(

@@ -39,21 +39,14 @@ LEAST_SHARE = 0.2
 
 @dataclasses.dataclass(frozen=True)
 class Draws:
-    """R loops, each of which may be the recorded one.
+    """R loops, each of which may be the recorded one."""
 
-    Attributes:
-        frictions: (f_S, f_D) of the valve that is looked at, %, shape (R, 2).
-        tunings: (K, K_i, K_d) of its controller, scaled, shape (R, 3).
-        stems: of all valves in the record, scaled, shape (R, m, N).
-        equations: of PV, and what comes from outside.
-        likeliest: draws at the begin that nothing was changed in: the loop as identified, and of
-            a valve that is undecided the loop without friction.
-    """
-
-    frictions: FloatArray
-    tunings: FloatArray
-    stems: FloatArray
-    equations: Equations
+    frictions: FloatArray  # (f_S, f_D) of the valve that is looked at, %, shape (R, 2)
+    tunings: FloatArray  # (K, K_i, K_d) of its controller, scaled, shape (R, 3)
+    stems: FloatArray  # of all valves in the record, scaled, shape (R, m, N)
+    equations: Equations  # of PV, and what comes from outside
+    # draws at the begin that nothing was changed in: the loop as identified, and of a valve that is
+    # undecided the loop without friction
     likeliest: int = 1
 
     def __len__(self) -> int:

@@ -58,19 +58,12 @@ STEM_NOISE = 0.1
 
 @dataclasses.dataclass(frozen=True)
 class EmbeddingDesign:
-    """What the controller of one loop is built from.
+    """What the controller of one loop is built from."""
 
-    Attributes:
-        model: of the process, its valve without friction.
-        settings: weights and observer.
-        friction: law of the valve.
-        spread: half-widths of their intervals; None where they are known.
-    """
-
-    model: LoopModel
-    settings: ControlSettings
-    friction: Behaviour
-    spread: FrictionSpread | None
+    model: LoopModel  # of the process, its valve without friction
+    settings: ControlSettings  # weights and observer
+    friction: Behaviour  # law of the valve
+    spread: FrictionSpread | None  # half-widths of their intervals; None where they are known
 
     @classmethod
     def of(cls, loop: RecordedLoop) -> EmbeddingDesign:

@@ -65,21 +65,16 @@ class What(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Option:
-    """One thing that may be done, and what the loop then does.
+    """One thing that may be done, and what the loop then does."""
 
-    Attributes:
-        what: see :class:`What`.
-        measures: of the likeliest of the drawn loops, of the embedding their medians; None where
-            it could not be simulated, or where the draws do not agree.
-        interval: 5th and 95th percentile of each measure over the draws.
-        note: one sentence.
-        settings: weights of the embedding, factors of the retuning.
-    """
-
-    what: What
+    what: What  # see ``What``
+    # of the likeliest of the drawn loops, of the embedding their medians; None where it could not
+    # be simulated, or where the draws do not agree
     measures: Measures | None
+    # 5th and 95th percentile of each measure over the draws
     interval: dict[str, tuple[float, float]]
-    note: str
+    note: str  # one sentence
+    # weights of the embedding, factors of the retuning
     settings: dict[str, float] = dataclasses.field(default_factory=dict)
 
     def beside(self, now: Measures, left: Measures) -> Option:
@@ -148,20 +143,13 @@ class Option:
 
 @dataclasses.dataclass(frozen=True)
 class Gain:
-    """What would help a loop.
+    """What would help a loop."""
 
-    Attributes:
-        valve, output: tags of what was looked at.
-        now: of the record.
-        options: in the order of :class:`What`.
-        notes: remarks for people.
-    """
-
-    valve: str
+    valve: str  # valve, output: tags of what was looked at
     output: str
-    now: Measures
-    options: tuple[Option, ...]
-    notes: tuple[str, ...] = ()
+    now: Measures  # of the record
+    options: tuple[Option, ...]  # in the order of ``What``
+    notes: tuple[str, ...] = ()  # remarks for people
 
     def option(self, what: What) -> Option:
         """Return one option."""

@@ -27,23 +27,14 @@ from stiction_ros.signals.oscillation import (
 
 @dataclasses.dataclass(frozen=True)
 class Measures:
-    """How a loop does.
+    """How a loop does."""
 
-    Attributes:
-        amplitude: engineering units of PV; None where the loop does not cycle now.
-        iae_per_hour: engineering units of PV.
-        travel_per_hour: of the stem, %.
-        moves_per_hour: of the stem.
-        reversals_per_hour: of the stem.
-        period: at which the amplitude is, s; None where there is none.
-    """
-
-    amplitude: float | None
-    iae_per_hour: float
-    travel_per_hour: float
-    moves_per_hour: float
-    reversals_per_hour: float
-    period: float | None = None
+    amplitude: float | None  # engineering units of PV; None where the loop does not cycle now
+    iae_per_hour: float  # engineering units of PV
+    travel_per_hour: float  # of the stem, %
+    moves_per_hour: float  # of the stem
+    reversals_per_hour: float  # of the stem
+    period: float | None = None  # at which the amplitude is, s; None where there is none
 
     def to_dict(self) -> dict[str, float | None]:
         """Return the mapping of ``gain --json``."""
@@ -52,17 +43,11 @@ class Measures:
 
 @dataclasses.dataclass(frozen=True)
 class Yardstick:
-    """How the runs of one loop are measured, all alike.
+    """How the runs of one loop are measured, all alike."""
 
-    Attributes:
-        sample_time: s.
-        cycles: whether the loop cycles now; else no run has an amplitude.
-        stretches: without a move of the set-point, in samples of a run.
-    """
-
-    sample_time: float
-    cycles: bool
-    stretches: Sequence[tuple[int, int]]
+    sample_time: float  # s
+    cycles: bool  # whether the loop cycles now; else no run has an amplitude
+    stretches: Sequence[tuple[int, int]]  # without a move of the set-point, in samples of a run
 
     def measured(self, error: FloatArray, stem: FloatArray) -> Measures | None:
         """Return the measures of one run, as :meth:`measure`; None where it grows without end."""

@@ -53,21 +53,13 @@ Friction = FrictionPair | SlipJumpPair
 
 @dataclasses.dataclass(frozen=True)
 class ModelLoop:
-    """One valve, one output, one PI controller, ready to be simulated.
+    """One valve, one output, one PI controller, ready to be simulated."""
 
-    Attributes:
-        model: as given.
-        tuning: of its controller.
-        friction: law of its valve; None without one.
-        set_points: schedule.
-        samples: of a run.
-    """
-
-    model: LoopModel
-    tuning: PiTuning
-    friction: Friction | None
-    set_points: SetPoints
-    samples: int
+    model: LoopModel  # as given
+    tuning: PiTuning  # of its controller
+    friction: Friction | None  # law of its valve; None without one
+    set_points: SetPoints  # schedule
+    samples: int  # of a run
 
     @classmethod
     def of(

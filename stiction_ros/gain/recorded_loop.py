@@ -71,32 +71,20 @@ MOST = 4000
 
 @dataclasses.dataclass(frozen=True)
 class RecordedLoop:
-    """One valve in its loop; signals scaled, rows those that are run again.
+    """One valve in its loop; signals scaled, rows those that are run again."""
 
-    Attributes:
-        record: what was measured.
-        estimates: of all valves.
-        loop: the scaled signals.
-        process: equation (9) as identified.
-        pairs: per valve the output of its controller, −1 for none, and the controller.
-        valve, output: indices of what is looked at.
-        begin: first sample that is looked at.
-        rows: first row that is run, and the one behind the last.
-        answers: how each output is explained from sample ``begin`` on.
-        yardstick: measures of a run.
-    """
-
-    record: Record
-    estimates: tuple[ValveEstimate, ...]
-    loop: ScaledLoop
-    process: Process
+    record: Record  # what was measured
+    estimates: tuple[ValveEstimate, ...]  # of all valves
+    loop: ScaledLoop  # the scaled signals
+    process: Process  # equation (9) as identified
+    # per valve the output of its controller, −1 for none, and the controller
     pairs: tuple[tuple[int, RecoveredController], ...]
-    valve: int
+    valve: int  # valve, output: indices of what is looked at
     output: int
-    begin: int
-    rows: tuple[int, int]
-    answers: tuple[Answering, ...]
-    yardstick: Yardstick
+    begin: int  # first sample that is looked at
+    rows: tuple[int, int]  # first row that is run, and the one behind the last
+    answers: tuple[Answering, ...]  # how each output is explained from sample ``begin`` on
+    yardstick: Yardstick  # measures of a run
 
     @classmethod
     def of(cls, record: Record, found: Identification, valve: str | None = None) -> RecordedLoop:

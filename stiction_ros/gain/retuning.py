@@ -48,15 +48,10 @@ FREQUENCIES = 300
 
 @dataclasses.dataclass(frozen=True)
 class Tuning:
-    """Factors on the controller that is there.
+    """Factors on the controller that is there."""
 
-    Attributes:
-        gain: on K.
-        integral_time: on T_i.
-    """
-
-    gain: float = 1.0
-    integral_time: float = 1.0
+    gain: float = 1.0  # on K
+    integral_time: float = 1.0  # on T_i
 
     def applied(self, tunings: FloatArray) -> FloatArray:
         """Return (K, K_i, K_d), shape (R, 3), with the factors."""

@@ -19,24 +19,15 @@ BRIDGED_SHARE = 0.01  # of the window
 
 @dataclasses.dataclass(frozen=True)
 class PairedSample:
-    """One sample.
+    """One sample."""
 
-    Attributes:
-        sample: number, counted from the first PV, on and on when a new run begins.
-        stamp: ns.
-        op, pv: shapes (m,) and (p,); PV is NaN at a bad sample that is not bridged.
-        missed: samples before it that never came and are not bridged.
-        bridged: whether PV is interpolated, as its own was missing or not finite.
-        begins: whether a new run begins with it.
-    """
-
-    sample: int
-    stamp: int
-    op: FloatArray
+    sample: int  # number, counted from the first PV, on and on when a new run begins
+    stamp: int  # ns
+    op: FloatArray  # op, pv: shapes (m,) and (p,); PV is NaN at a bad sample that is not bridged
     pv: FloatArray
-    missed: int = 0
-    bridged: bool = False
-    begins: bool = False
+    missed: int = 0  # samples before it that never came and are not bridged
+    bridged: bool = False  # whether PV is interpolated, as its own was missing or not finite
+    begins: bool = False  # whether a new run begins with it
 
 
 class Pairing:

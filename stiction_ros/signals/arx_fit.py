@@ -29,20 +29,15 @@ Delays = tuple[tuple[int, ...], ...]
 class ArxOrders:
     """Orders of the ARX equations and the first row of the criterion.
 
-    Attributes:
-        output: n_a ≥ 1.
-        input: n_b ≥ 1, for every valve.
-        first: ε, first sample of the criterion, at least n_a and n_b plus the longest delay.
-        channels: for each output its n_a^(i) and the n_bj^(i) of every valve, (8a) to (8c), none
-            above ``output`` and ``input``; None where all are alike.
-
     Raises:
         InputError: a value out of range.
     """
 
-    output: int
-    input: int
-    first: int
+    output: int  # n_a ≥ 1
+    input: int  # n_b ≥ 1, for every valve
+    first: int  # ε, first sample of the criterion, at least n_a and n_b plus the longest delay
+    # for each output its n_a^(i) and the n_bj^(i) of every valve, (8a) to (8c), none above
+    # ``output`` and ``input``; None where all are alike
     channels: tuple[tuple[int, tuple[int, ...]], ...] | None = None
 
     def __post_init__(self) -> None:
@@ -83,23 +78,14 @@ class ArxOrders:
 
 @dataclasses.dataclass(frozen=True)
 class ArxFit:
-    """Least-squares ARX model of one output.
+    """Least-squares ARX model of one output."""
 
-    Attributes:
-        delays: t_d per valve, samples.
-        a: a_1 … a_na, shape (n_a,), sign as in (8a).
-        b: shape (m, n_b), engineering units of PV per % of travel.
-        constant: c, engineering units.
-        squared_error: SE of (14), squared engineering units.
-        residuals: y − ŷ from sample ε on, shape (N − ε,).
-    """
-
-    delays: tuple[int, ...]
-    a: FloatArray
-    b: FloatArray
-    constant: float
-    squared_error: float
-    residuals: FloatArray
+    delays: tuple[int, ...]  # t_d per valve, samples
+    a: FloatArray  # a_1 … a_na, shape (n_a,), sign as in (8a)
+    b: FloatArray  # shape (m, n_b), engineering units of PV per % of travel
+    constant: float  # c, engineering units
+    squared_error: float  # SE of (14), squared engineering units
+    residuals: FloatArray  # y − ŷ from sample ε on, shape (N − ε,)
 
     @property
     def largest_root(self) -> float:

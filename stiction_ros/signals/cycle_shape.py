@@ -22,16 +22,12 @@ UNSEEN_CYCLES = 10  # in a signal that does not oscillate: half cycles of its sl
 
 @dataclasses.dataclass(frozen=True)
 class CycleShape:
-    """The shape of a signal's movement about its slow mean.
+    """The shape of a signal's movement about its slow mean."""
 
-    Attributes:
-        half_cycles: standard deviation of the times between zero crossings over their mean, 0 for a
-            regular cycle; 1 where there are fewer than four.
-        kurtosis: 1 for a square, 1.5 for a sine, 1.8 for a triangle, 3 for noise.
-    """
-
+    # standard deviation of the times between zero crossings over their mean, 0 for a regular cycle;
+    # 1 where there are fewer than four
     half_cycles: float
-    kurtosis: float
+    kurtosis: float  # 1 for a square, 1.5 for a sine, 1.8 for a triangle, 3 for noise
 
     @classmethod
     def of(cls, values: FloatArray) -> Self:

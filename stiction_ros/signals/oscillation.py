@@ -58,38 +58,23 @@ REGULAR = 1.0
 
 @dataclasses.dataclass(frozen=True)
 class Cycle:
-    """The oscillation of a loop.
+    """The oscillation of a loop."""
 
-    Attributes:
-        period: dominant period, samples.
-        share: of the variance inside the stretches that it explains, of the clearest output.
-        count: whole cycles that this output went through inside the stretches.
-        output: index of that output.
-    """
-
-    period: float
-    share: float
-    count: int
-    output: int
+    period: float  # dominant period, samples
+    share: float  # of the variance inside the stretches that it explains, of the clearest output
+    count: int  # whole cycles that this output went through inside the stretches
+    output: int  # index of that output
 
 
 @dataclasses.dataclass(frozen=True)
 class Oscillation:
-    """How one signal oscillates.
+    """How one signal oscillates."""
 
-    Attributes:
-        period: dominant period, samples.
-        share: of the variance that the line at this period explains.
-        count: whole cycles.
-        regularity: above 1 is regular.
-        amplitude: √2 × RMS of the line over pieces of four cycles, units of the signal.
-    """
-
-    period: float
-    share: float
-    count: int
-    regularity: float
-    amplitude: float
+    period: float  # dominant period, samples
+    share: float  # of the variance that the line at this period explains
+    count: int  # whole cycles
+    regularity: float  # above 1 is regular
+    amplitude: float  # √2 × RMS of the line over pieces of four cycles, units of the signal
 
 
 def oscillation(values: FloatArray, stretches: Stretches) -> Oscillation | None:

@@ -49,17 +49,11 @@ LEAST_ROWS = 40
 
 @dataclasses.dataclass(frozen=True)
 class OutsideLine:
-    """What a line at a cycle's period adds.
+    """What a line at a cycle's period adds."""
 
-    Attributes:
-        gain: BIC without minus BIC with the line; above 0 the line is there.
-        period: the best one, samples.
-        plain: BIC without.
-    """
-
-    gain: float
-    period: float
-    plain: float
+    gain: float  # BIC without minus BIC with the line; above 0 the line is there
+    period: float  # the best one, samples
+    plain: float  # BIC without
 
 
 NO_LINE = OutsideLine(0.0, 0.0, 0.0)
@@ -67,17 +61,11 @@ NO_LINE = OutsideLine(0.0, 0.0, 0.0)
 
 @dataclasses.dataclass(frozen=True)
 class Predicted:
-    """A signal and what it is predicted from.
+    """A signal and what it is predicted from."""
 
-    Attributes:
-        y: shape (N,).
-        inputs: shape (N,) each.
-        delays: samples before the first of each input counts, 0 for the same sample.
-    """
-
-    y: FloatArray
-    inputs: Sequence[FloatArray]
-    delays: Sequence[int]
+    y: FloatArray  # shape (N,)
+    inputs: Sequence[FloatArray]  # shape (N,) each
+    delays: Sequence[int]  # samples before the first of each input counts, 0 for the same sample
 
     def columns(self, order: int, first: int) -> list[FloatArray]:
         """Return ``order`` samples of each signal for every row from ``first`` on."""

@@ -22,33 +22,21 @@ class ControllerStatus(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class RecoveredController:
-    """A PI(D) controller in velocity form, all times in samples.
+    """A PI(D) controller in velocity form, all times in samples."""
 
-    Attributes:
-        status: ok, or why there is none.
-        reason: one sentence; empty when ok.
-        set_point: as recorded or found, shape (N,).
-        limits: where OP was seen to rest while the controller would have gone on; infinite
-            where it was not.
-        coefficients: (K, K_i, K_d), OP per unit of PV and sample, signed for e = SP − PV,
-            shape (3,).
-        covariance: of the coefficients from a jackknife over blocks, shape (3, 3).
-        lag: samples between PV and the OP that answers it.
-        smoothing: share of the last value in the filter of the error.
-        span: h, samples.
-        r_squared: share of the moves of OP over h samples that is explained.
-    """
-
-    status: ControllerStatus
-    reason: str
-    set_point: FloatArray
+    status: ControllerStatus  # ok, or why there is none
+    reason: str  # one sentence; empty when ok
+    set_point: FloatArray  # as recorded or found, shape (N,)
+    # where OP was seen to rest while the controller would have gone on; infinite where it was not
     limits: tuple[float, float]
+    # (K, K_i, K_d), OP per unit of PV and sample, signed for e = SP − PV, shape (3,)
     coefficients: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(3))
+    # of the coefficients from a jackknife over blocks, shape (3, 3)
     covariance: FloatArray = dataclasses.field(default_factory=lambda: np.zeros((3, 3)))
-    lag: int = 0
-    smoothing: float = 0.0
-    span: int = 1
-    r_squared: float = 0.0
+    lag: int = 0  # samples between PV and the OP that answers it
+    smoothing: float = 0.0  # share of the last value in the filter of the error
+    span: int = 1  # h, samples
+    r_squared: float = 0.0  # share of the moves of OP over h samples that is explained
 
     @property
     def gain(self) -> float:
@@ -65,15 +53,9 @@ class RecoveredController:
 
 @dataclasses.dataclass(frozen=True)
 class LoopSignals:
-    """What a controller reads and writes.
+    """What a controller reads and writes."""
 
-    Attributes:
-        op, pv: shape (N,).
-        sp: shape (N,), or None when not recorded.
-        stretches: first sample of each stretch in automatic and the one behind its last.
-    """
-
-    op: FloatArray
+    op: FloatArray  # op, pv: shape (N,)
     pv: FloatArray
-    sp: FloatArray | None
-    stretches: Stretches
+    sp: FloatArray | None  # shape (N,), or None when not recorded
+    stretches: Stretches  # first sample of each stretch in automatic and the one behind its last

@@ -25,20 +25,14 @@ TINY = 1e-24
 
 @dataclasses.dataclass(frozen=True)
 class Realisation:
-    """An innovation model of centred, scaled data.
+    """An innovation model of centred, scaled data."""
 
-    Attributes:
-        a, b, c, k: shapes (n, n), (n, m), (p, n), (n, p).
-        x0: ξ of the first sample, shape (n,).
-        y0: offset, shape (p,).
-    """
-
-    a: FloatArray
+    a: FloatArray  # a, b, c, k: shapes (n, n), (n, m), (p, n), (n, p)
     b: FloatArray
     c: FloatArray
     k: FloatArray
-    x0: FloatArray
-    y0: FloatArray
+    x0: FloatArray  # ξ of the first sample, shape (n,)
+    y0: FloatArray  # offset, shape (p,)
 
     @property
     def radius(self) -> float:

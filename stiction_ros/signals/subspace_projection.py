@@ -40,22 +40,14 @@ class SubspaceMethod(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class StateSequence:
-    """States up to similarity, ordered by weight.
+    """States up to similarity, ordered by weight."""
 
-    Attributes:
-        states: shape (n_max, N − s + 1); column 0 belongs to sample s.
-        observability: C, C Ã, … C Ã^(s−1) stacked, shape (s p, n_max), with Ã = A, or
-            A − K C where ``predicting``.
-        predicting: whether the projection is that of ``PREDICTOR``.
-        singular_values: all of the weighted projection, falling.
-        horizon: s.
-    """
-
-    states: FloatArray
+    states: FloatArray  # shape (n_max, N − s + 1); column 0 belongs to sample s
+    # C, C Ã, … C Ã^(s−1) stacked, shape (s p, n_max), with Ã = A, or A − K C where ``predicting``
     observability: FloatArray
-    predicting: bool
-    singular_values: FloatArray
-    horizon: int
+    predicting: bool  # whether the projection is that of ``PREDICTOR``
+    singular_values: FloatArray  # all of the weighted projection, falling
+    horizon: int  # s
 
 
 def hankel_rows(signals: FloatArray, first: int, count: int, columns: int) -> FloatArray:

@@ -33,35 +33,23 @@ FACTOR = "factor"  # of a gain, 1 where it is the model's
 
 @dataclasses.dataclass(frozen=True)
 class FoundEffect:
-    """One effect that the simulation lacked.
+    """One effect that the simulation lacked."""
 
-    Attributes:
-        place, effect: as loop models name them.
-        law: which of several laws of one effect, or None.
-        parameters: in engineering units, times in seconds since the first sample.
-        units: of the parameters.
-        intervals: 95 % of each parameter that has one.
-        delta_bic: BIC by which it beats the model without it.
-        closed: share of the free-run excess that is gone with it and not without it; NaN for
-            what no free run shows.
-        verdict: named or ambiguous.
-        alternatives: places and effects that the record does not tell from it.
-        sentence: why it and not its rivals.
-        moves: what it adds to the free run, shape (N, p), units of PV; None for what no free
-            run shows.
-    """
-
-    place: str
+    place: str  # place, effect: as loop models name them
     effect: str
-    law: str | None
-    parameters: Mapping[str, float]
-    units: Mapping[str, str]
-    intervals: Mapping[str, tuple[float, float]]
-    delta_bic: float
+    law: str | None  # which of several laws of one effect, or None
+    parameters: Mapping[str, float]  # in engineering units, times in seconds since the first sample
+    units: Mapping[str, str]  # of the parameters
+    intervals: Mapping[str, tuple[float, float]]  # 95 % of each parameter that has one
+    delta_bic: float  # BIC by which it beats the model without it
+    # share of the free-run excess that is gone with it and not without it; NaN for what no free run
+    # shows
     closed: float
-    verdict: GapVerdict
+    verdict: GapVerdict  # named or ambiguous
+    # places and effects that the record does not tell from it
     alternatives: tuple[tuple[str, str], ...] = ()
-    sentence: str = ""
+    sentence: str = ""  # why it and not its rivals
+    # what it adds to the free run, shape (N, p), units of PV; None for what no free run shows
     moves: FloatArray | None = dataclasses.field(default=None, compare=False, repr=False)
 
     @property

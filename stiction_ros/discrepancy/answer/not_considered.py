@@ -22,18 +22,12 @@ NO_ROOM = (
 
 @dataclasses.dataclass(frozen=True)
 class NotConsidered:
-    """A behaviour that was no candidate.
+    """A behaviour that was no candidate."""
 
-    Attributes:
-        place: kind of place, such as ``sensor``.
-        effect, law: as loop models name them; no law where the effect has one only.
-        reason: one clause.
-    """
-
-    place: str
-    effect: str
+    place: str  # kind of place, such as ``sensor``
+    effect: str  # effect, law: as loop models name them; no law where the effect has one only
     law: str | None
-    reason: str
+    reason: str  # one clause
 
     @property
     def name(self) -> str:

@@ -36,15 +36,11 @@ _SAME: dict[tuple[str, str], Callable[[Figures], Figures]] = {
 
 @dataclasses.dataclass(frozen=True)
 class Shown:
-    """What one rival would show.
+    """What one rival would show."""
 
-    Attributes:
-        place, effect: of the rival.
-        stem, pv, true: stem in %, PV as its sensor shows it, and the output itself, shape (K,).
-    """
-
-    place: str
+    place: str  # place, effect: of the rival
     effect: str
+    # stem, pv, true: stem in %, PV as its sensor shows it, and the output itself, shape (K,)
     stem: FloatArray
     pv: FloatArray
     true: FloatArray
@@ -52,20 +48,13 @@ class Shown:
 
 @dataclasses.dataclass(frozen=True)
 class Preview:
-    """A simulated experiment: OP by hand up, back and in one step, without noise.
+    """A simulated experiment: OP by hand up, back and in one step, without noise."""
 
-    Attributes:
-        valve, output: that are moved and shown.
-        op: shape (K,), %.
-        sample_time: s.
-        rivals: at least two.
-    """
-
-    valve: str
+    valve: str  # valve, output: that are moved and shown
     output: str
-    op: FloatArray
-    sample_time: float
-    rivals: tuple[Shown, ...]
+    op: FloatArray  # shape (K,), %
+    sample_time: float  # s
+    rivals: tuple[Shown, ...]  # at least two
 
 
 def preview(found: Discrepancy) -> Preview | None:

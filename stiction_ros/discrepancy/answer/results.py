@@ -22,21 +22,13 @@ from stiction_ros.loop import LoopModel
 
 @dataclasses.dataclass(frozen=True)
 class Look:
-    """One round: scores of all candidates and what they allowed to say.
+    """One round: scores of all candidates and what they allowed to say."""
 
-    Attributes:
-        scores: of every candidate.
-        decision: what they say.
-        where: where the gap of this round is.
-        kept: whether the chosen effect stayed in the model.
-        reason: why it did not.
-    """
-
-    scores: Scores
-    decision: Decision
-    where: Where
-    kept: bool
-    reason: str
+    scores: Scores  # of every candidate
+    decision: Decision  # what they say
+    where: Where  # where the gap of this round is
+    kept: bool  # whether the chosen effect stayed in the model
+    reason: str  # why it did not
 
 
 @dataclasses.dataclass(frozen=True)

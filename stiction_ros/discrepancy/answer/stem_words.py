@@ -23,29 +23,18 @@ ACCURATE = 0.01  # of the span of OP: a stem that near follows it
 
 @dataclasses.dataclass(frozen=True)
 class StemLook:
-    """A recorded stem against OP.
+    """A recorded stem against OP."""
 
-    Attributes:
-        valve: tag.
-        off: root mean square of stem less where the model has it, %, a constant taken out.
-        constant: that constant, %.
-        moved: whether the model moves it by anything but OP.
-        late: samples by which the stem matches that best; 0 as well where it may be more than
-            :data:`LATEST`.
-        behaviour: the effect of the valve that explains most of the distance; None where none
-            explains enough.
-        share: of the squared distance that it explains, 0 to 1.
-        span: of OP, %.
-    """
-
-    valve: str
-    off: float
-    constant: float
-    moved: bool
+    valve: str  # tag
+    off: float  # root mean square of stem less where the model has it, %, a constant taken out
+    constant: float  # that constant, %
+    moved: bool  # whether the model moves it by anything but OP
+    # samples by which the stem matches that best; 0 as well where it may be more than ``LATEST``
     late: int
+    # the effect of the valve that explains most of the distance; None where none explains enough
     behaviour: Behaviour | None
-    share: float
-    span: float
+    share: float  # of the squared distance that it explains, 0 to 1
+    span: float  # of OP, %
 
     @property
     def sentence(self) -> str:

@@ -20,17 +20,13 @@ _NEIGHBOURS = 1.5  # steps of the first grid
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """What a candidate adds to the free run, for G points of its grid.
+    """What a candidate adds to the free run, for G points of its grid."""
 
-    Attributes:
-        shifts: per output, shape (N, G): added as it is.
-        sizes: per output, shape (N, G, s): added with s factors that least squares finds.
-        possible: which points are figures that the effect can have, shape (G,); None for all.
-            What is said of the others is never used.
-    """
-
-    shifts: Mapping[int, FloatArray]
+    shifts: Mapping[int, FloatArray]  # per output, shape (N, G): added as it is
+    # per output, shape (N, G, s): added with s factors that least squares finds
     sizes: Mapping[int, FloatArray] = dataclasses.field(default_factory=dict)
+    # which points are figures that the effect can have, shape (G,); None for all. What is said of
+    # the others is never used
     possible: BoolArray | None = None
 
     @property
@@ -59,46 +55,33 @@ class Response:
 
 
 class Identity(NamedTuple):
-    """Which change of a model a candidate is, whatever its figures and the model behind it.
+    """Which change of a model a candidate is, whatever its figures and the model behind it."""
 
-    Attributes:
-        place, effect: as loop models name them.
-        law: where the effect has several; None elsewhere.
-    """
-
-    place: str
+    place: str  # place, effect: as loop models name them
     effect: str
-    law: str | None
+    law: str | None  # where the effect has several; None elsewhere
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class Candidate(ABC):
-    """One change of the current model; the same one beside another model has its ``identity``.
+    """One change of the current model; the same one beside another model has its ``identity``."""
 
-    Attributes:
-        place, effect: as loop models name them, such as ``valve:V1`` and ``stiction``.
-        axes: of the figures that are searched; may be empty.
-        factors: number of figures that least squares finds.
-        twins: places and effects that no record of OP and PV tells from this one.
-        dated: whether its first axis is a moment of the record.
-        contains: places and effects of the catalogue that are parts of it.
-        most_of: share of what it gains that such a part has to gain to be looked at first.
-        needle: whether its optimum is narrower than any lattice is fine.
-        sharp: whether its likelihood may have peaks a sample wide, so that it is searched under
-            noises as well that blur them.
-        inside: whether it belongs to the catalogue; others show only that something is amiss.
-    """
-
-    place: str
+    place: str  # place, effect: as loop models name them, such as ``valve:V1`` and ``stiction``
     effect: str
-    axes: tuple[Axis, ...] = ()
-    factors: int = 0
+    axes: tuple[Axis, ...] = ()  # of the figures that are searched; may be empty
+    factors: int = 0  # number of figures that least squares finds
+    # places and effects that no record of OP and PV tells from this one
     twins: tuple[tuple[str, str], ...] = ()
+    # whether it belongs to the catalogue; others show only that something is amiss
     inside: bool = True
-    dated: bool = False
+    dated: bool = False  # whether its first axis is a moment of the record
+    # places and effects of the catalogue that are parts of it
     contains: tuple[tuple[str, str], ...] = ()
+    # share of what it gains that such a part has to gain to be looked at first
     most_of: float = 0.5
-    needle: bool = False
+    needle: bool = False  # whether its optimum is narrower than any lattice is fine
+    # whether its likelihood may have peaks a sample wide, so that it is searched under noises as
+    # well that blur them
     sharp: bool = False
 
     @abstractmethod

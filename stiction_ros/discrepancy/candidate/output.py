@@ -38,13 +38,9 @@ INTEGRATES = 0.05  # of the record: a process with a longer time constant may le
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class OutputCandidate(Candidate):
-    """A change of one output alone.
+    """A change of one output alone."""
 
-    Attributes:
-        output: its index.
-    """
-
-    output: int
+    output: int  # its index
 
     def signal(self, run: FreeRun) -> FloatArray:
         return run.forced[:, self.output]
@@ -52,13 +48,9 @@ class OutputCandidate(Candidate):
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class FilterCandidate(OutputCandidate):
-    """A linear change between process and sensor: pole, delay, leak.
+    """A linear change between process and sensor: pole, delay, leak."""
 
-    Attributes:
-        kind: the behaviour; its first figure is searched.
-    """
-
-    kind: type[Behaviour]
+    kind: type[Behaviour]  # the behaviour; its first figure is searched
 
     @classmethod
     def of(cls, run: FreeRun, output: int, kind: type[Behaviour], axes: tuple[Axis, ...]) -> Self:

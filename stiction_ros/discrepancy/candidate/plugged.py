@@ -21,14 +21,10 @@ ON_OUTPUTS = ("process", "disturbance", "sensor")
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class _Plugged(Candidate):
-    """A behaviour by its own axes, wherever it acts.
+    """A behaviour by its own axes, wherever it acts."""
 
-    Attributes:
-        plugged: the behaviour.
-        moments: at which PV surprises most, s; first values of a figure that is a moment.
-    """
-
-    plugged: type[Behaviour]
+    plugged: type[Behaviour]  # the behaviour
+    # at which PV surprises most, s; first values of a figure that is a moment
     moments: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(0))
 
     def grid(self) -> FloatArray:
@@ -81,13 +77,9 @@ class PluggedValve(_Plugged, ValveCandidate):
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class PluggedLoad(_Plugged):
-    """A behaviour that enters the process beside the stem of a valve.
+    """A behaviour that enters the process beside the stem of a valve."""
 
-    Attributes:
-        valve: its index.
-    """
-
-    valve: int
+    valve: int  # its index
 
     @classmethod
     def of(cls, run: FreeRun, valve: int, kind: type[Behaviour], moments: FloatArray) -> Self:

@@ -53,14 +53,10 @@ class ValveCandidate(Candidate):
 
     Its stems start at rest at the first OP; stiction, backlash, a lag and a slew have one more
     figure, where the stem stood then.
-
-    Attributes:
-        valve: its index.
-        kind: the behaviour.
     """
 
-    valve: int
-    kind: type[Behaviour]
+    valve: int  # its index
+    kind: type[Behaviour]  # the behaviour
 
     @classmethod
     def at(cls, run: FreeRun, valve: int, kind: type[Behaviour], axes: tuple[Axis, ...]) -> Self:
@@ -223,13 +219,9 @@ class LagCandidate(OneFigure):
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class SlewCandidate(OneFigure):
-    """A slew by its rate and the place of the stem at the start.
+    """A slew by its rate and the place of the stem at the start."""
 
-    Attributes:
-        reach: how far off OP it may be at the start, %.
-    """
-
-    reach: float = 0.0
+    reach: float = 0.0  # how far off OP it may be at the start, %
 
     @classmethod
     def within(cls, run: FreeRun, valve: int, axes: tuple[Axis, ...], reach: float) -> Self:
@@ -242,13 +234,9 @@ class SlewCandidate(OneFigure):
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class CubicCandidate(ValveCandidate):
-    """A characteristic of two figures, by the first and the best second one.
+    """A characteristic of two figures, by the first and the best second one."""
 
-    Attributes:
-        low, high: between which OP moves, %.
-    """
-
-    low: float
+    low: float  # low, high: between which OP moves, %
     high: float
 
     @property

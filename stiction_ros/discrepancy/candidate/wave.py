@@ -40,15 +40,10 @@ _IN_VALVE = {"step": "offset"}
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class WaveCandidate(Candidate):
-    """A wave that enters somewhere.
+    """A wave that enters somewhere."""
 
-    Attributes:
-        wave: its shape.
-        index: of the output that it is added to, or of the valve beside which it enters.
-    """
-
-    wave: Wave
-    index: int
+    wave: Wave  # its shape
+    index: int  # of the output that it is added to, or of the valve beside which it enters
 
     @classmethod
     def of(cls, place: str, index: int, wave: Wave, twins: tuple[tuple[str, str], ...]) -> Self:

@@ -35,21 +35,13 @@ _TURN = 2.0 * math.pi
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class Wave(ABC):
-    """A shape in time.
+    """A shape in time."""
 
-    Attributes:
-        effect: as loop models name it.
-        axes: of the figures that are searched.
-        factors: number of figures that least squares finds.
-        dated: whether its first axis is a moment of the record.
-        further: figures that it counts as for BIC, beyond those that it has.
-    """
-
-    effect: str
-    axes: tuple[Axis, ...] = ()
-    factors: int = 1
-    dated: bool = False
-    further: int = 0
+    effect: str  # as loop models name it
+    axes: tuple[Axis, ...] = ()  # of the figures that are searched
+    factors: int = 1  # number of figures that least squares finds
+    dated: bool = False  # whether its first axis is a moment of the record
+    further: int = 0  # figures that it counts as for BIC, beyond those that it has
 
     @abstractmethod
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
@@ -70,17 +62,12 @@ class Wave(ABC):
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class StepWave(Wave):
-    """A step at one moment.
-
-    Attributes:
-        sample_time: s.
-        moments: at which PV surprises most, s.
-    """
+    """A step at one moment."""
 
     effect: str = StepDisturbance.effect
     dated: bool = True
-    sample_time: float
-    moments: FloatArray
+    sample_time: float  # s
+    moments: FloatArray  # at which PV surprises most, s
 
     @classmethod
     def of(cls, run: FreeRun, moments: FloatArray) -> Self:
@@ -118,18 +105,12 @@ class DriftWave(Wave):
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class LineWave(Wave):
-    """A wave that is searched near the lines of the gap's own spectrum.
-
-    Attributes:
-        sample_time: s.
-        length: of the longest record, samples.
-        lines: of the gap, cycles per sample.
-    """
+    """A wave that is searched near the lines of the gap's own spectrum."""
 
     further: int = A_FREQUENCY - 1
-    sample_time: float
-    length: int
-    lines: FloatArray
+    sample_time: float  # s
+    length: int  # of the longest record, samples
+    lines: FloatArray  # of the gap, cycles per sample
 
     @property
     def width(self) -> float:
@@ -179,12 +160,9 @@ class ShapedWave(LineWave):
     """A square or a triangle, by its frequency and where in its cycle it is amid the record.
 
     Where it begins would follow its frequency: what is searched apart has to be told apart.
-
-    Attributes:
-        kind: the behaviour.
     """
 
-    kind: type[SquareDisturbance | TriangleDisturbance]
+    kind: type[SquareDisturbance | TriangleDisturbance]  # the behaviour
 
     @classmethod
     def of(

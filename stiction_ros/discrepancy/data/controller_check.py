@@ -52,25 +52,18 @@ class ControllerStatus(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class ControllerCheck:
-    """What recomputing OP shows.
+    """What recomputing OP shows."""
 
-    Attributes:
-        status: see :class:`ControllerStatus`.
-        finding: another tuning or a time shift.
-        left: share of the moves of OP that the best PI law leaves, 0 to 1.
-        clock_known: whether the record's clock of PV against OP is shown to be right.
-        scans: of a controller that scans twice in a sample of the record; None of one that does
-            not, or whose OP between the samples is not told.
-        unsure: how far OP is off that was told by a law whose SP was not recorded.
-        between: whether OP is rounded and no tuning known: it may be another between the samples.
-    """
-
-    status: ControllerStatus
-    finding: DataFinding | None
-    left: float
-    clock_known: bool
+    status: ControllerStatus  # see ``ControllerStatus``
+    finding: DataFinding | None  # another tuning or a time shift
+    left: float  # share of the moves of OP that the best PI law leaves, 0 to 1
+    clock_known: bool  # whether the record's clock of PV against OP is shown to be right
+    # of a controller that scans twice in a sample of the record; None of one that does not, or
+    # whose OP between the samples is not told
     scans: Scans | None = None
+    # how far OP is off that was told by a law whose SP was not recorded
     unsure: Unseen | None = None
+    # whether OP is rounded and no tuning known: it may be another between the samples
     between: bool = False
 
     def op(self, runs: Runs) -> FloatArray:
@@ -212,20 +205,13 @@ def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
 
 @dataclasses.dataclass(frozen=True)
 class _Law:
-    """A PI law as the moves of OP show it.
+    """A PI law as the moves of OP show it."""
 
-    Attributes:
-        gain, integral_time: of the controller.
-        left: share of the moves that it leaves.
-        samples: how many moves there are.
-        usual: their root mean square, %.
-    """
-
-    gain: float
+    gain: float  # gain, integral_time: of the controller
     integral_time: float
-    left: float
-    samples: int
-    usual: float = 0.0
+    left: float  # share of the moves that it leaves
+    samples: int  # how many moves there are
+    usual: float = 0.0  # their root mean square, %
 
 
 def _scans(model: LoopModel, runs: Runs, law: _Law) -> Scans | None:

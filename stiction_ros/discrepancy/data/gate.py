@@ -32,47 +32,33 @@ COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a fi
 
 @dataclasses.dataclass(frozen=True)
 class DataFinding:
-    """An effect that the recorded values themselves show.
+    """An effect that the recorded values themselves show."""
 
-    Attributes:
-        place, effect: as loop models name them.
-        behaviour: with its figures.
-        delta_bic: by how much shorter the values are told with it.
-        record: index of the record.
-    """
-
-    place: str
+    place: str  # place, effect: as loop models name them
     effect: str
-    behaviour: Behaviour
-    delta_bic: float
-    record: int = 0
+    behaviour: Behaviour  # with its figures
+    delta_bic: float  # by how much shorter the values are told with it
+    record: int = 0  # index of the record
 
 
 @dataclasses.dataclass(frozen=True)
 class Gate:
-    """What the data allow.
+    """What the data allow."""
 
-    Attributes:
-        usable: per output the rows whose PV is a measurement, shape (p, N).
-        findings: frozen, clipped and rounded PVs, but for what the model has already.
-        filled: per output the rows whose PV a historian held or drew between the values that it
-            kept, shape (p, N).
-        quantum: per output the distance of PV's values; 0 where they are as good as continuous.
-        rounding: the same, where it is coarse enough to matter; 0 elsewhere.
-        set_point_moves: per output, over all records; None where SP is not recorded.
-        reversals: of OP per valve.
-        notes: remarks for people.
-        alone: per output, how many single samples far off both neighbours were left out.
-    """
-
-    usable: BoolArray
+    usable: BoolArray  # per output the rows whose PV is a measurement, shape (p, N)
+    # frozen, clipped and rounded PVs, but for what the model has already
     findings: tuple[DataFinding, ...]
+    # per output the rows whose PV a historian held or drew between the values that it kept, shape
+    # (p, N)
     filled: BoolArray
+    # per output the distance of PV's values; 0 where they are as good as continuous
     quantum: tuple[float, ...]
-    rounding: tuple[float, ...]
+    rounding: tuple[float, ...]  # the same, where it is coarse enough to matter; 0 elsewhere
+    # per output, over all records; None where SP is not recorded
     set_point_moves: tuple[int, ...] | None
-    reversals: tuple[int, ...]
-    notes: tuple[str, ...]
+    reversals: tuple[int, ...]  # of OP per valve
+    notes: tuple[str, ...]  # remarks for people
+    # per output, how many single samples far off both neighbours were left out
     alone: tuple[int, ...] = ()
 
 
@@ -204,16 +190,11 @@ def quantum_of(values: FloatArray) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class _Rests:
-    """Where the values of a record rest.
+    """Where the values of a record rest."""
 
-    Attributes:
-        first, last: sample of each rest, shape (R,).
-        count: N, of the record.
-    """
-
-    first: IntArray
+    first: IntArray  # first, last: sample of each rest, shape (R,)
     last: IntArray
-    count: int
+    count: int  # N, of the record
 
     @classmethod
     def of(cls, values: FloatArray) -> _Rests:

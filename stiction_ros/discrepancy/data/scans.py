@@ -25,15 +25,11 @@ class Scans:
         u_{k+1} &= u_{k+1/2} + K [(e_{k+1} - e_{k+1/2}) + (h / T_i) e_{k+1}]
 
     Both together hold the error between two samples once: the record tells it, and with it the OP.
-
-    Attributes:
-        gain, integral_time: of the controller, by the recorded moves of OP.
-        op: mean of the OPs of each sample, %, shape (N, 1).
     """
 
-    gain: float
+    gain: float  # gain, integral_time: of the controller, by the recorded moves of OP
     integral_time: float
-    op: FloatArray
+    op: FloatArray  # mean of the OPs of each sample, %, shape (N, 1)
 
     def each(self, recorded: FloatArray) -> FloatArray:
         """Return the OPs of both scans of each sample, shape (2 N, 1), the recorded one first."""
@@ -115,16 +111,11 @@ def _rests(error: FloatArray, most: float) -> BoolArray:
 
 @dataclasses.dataclass(frozen=True)
 class _Part:
-    """One record.
+    """One record."""
 
-    Attributes:
-        op, error: shape (N,).
-        moves: of OP, NaN where it is at a limit, shape (N − 1,).
-    """
-
-    op: FloatArray
+    op: FloatArray  # op, error: shape (N,)
     error: FloatArray
-    moves: FloatArray
+    moves: FloatArray  # of OP, NaN where it is at a limit, shape (N − 1,)
 
     @classmethod
     def of(cls, op: FloatArray, error: FloatArray, limits: tuple[float, float]) -> _Part:

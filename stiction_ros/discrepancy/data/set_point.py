@@ -31,19 +31,12 @@ LEFT = 0.5  # of the usual change of a move of OP, that a law may leave
 
 @dataclasses.dataclass(frozen=True)
 class Told:
-    """Records with set-points that a law tells.
+    """Records with set-points that a law tells."""
 
-    Attributes:
-        runs: the records.
-        tuning: of the controller.
-        error: standard error of a set-point, units of PV.
-        rest: samples between two moves of it, in the mean.
-    """
-
-    runs: Runs
-    tuning: PiTuning
-    error: float
-    rest: float
+    runs: Runs  # the records
+    tuning: PiTuning  # of the controller
+    error: float  # standard error of a set-point, units of PV
+    rest: float  # samples between two moves of it, in the mean
 
 
 def told_set_points(model: LoopModel, runs: Runs, scans: int) -> Told | None:
@@ -80,19 +73,12 @@ def told_set_points(model: LoopModel, runs: Runs, scans: int) -> Told | None:
 
 @dataclasses.dataclass(frozen=True)
 class _Part:
-    """One record.
+    """One record."""
 
-    Attributes:
-        scans: of the controller in a sample.
-        moves: u_k − u_{k−1}, shape (N,), the first 0.
-        columns: y_k − y_{k−1} and the sum of y over the scans since k − 1, shape (N, 2).
-        free: where OP and the two before it are between the limits, shape (N,).
-    """
-
-    scans: int
-    moves: FloatArray
-    columns: FloatArray
-    free: BoolArray
+    scans: int  # of the controller in a sample
+    moves: FloatArray  # u_k − u_{k−1}, shape (N,), the first 0
+    columns: FloatArray  # y_k − y_{k−1} and the sum of y over the scans since k − 1, shape (N, 2)
+    free: BoolArray  # where OP and the two before it are between the limits, shape (N,)
 
     @classmethod
     def of(cls, runs: Runs, rows: slice, scans: int, limits: FloatArray) -> _Part:

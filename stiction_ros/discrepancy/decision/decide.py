@@ -47,24 +47,16 @@ class GapVerdict(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Decision:
-    """What the scores of one look say.
+    """What the scores of one look say."""
 
-    Attributes:
-        verdict: none, named, ambiguous or unknown.
-        chosen: the best candidate of the catalogue, or None.
-        alternatives: places and effects that cannot be told from it.
-        inseparable: whether the alternatives are its twins or its family, so that adding it
-            serves for all of them.
-        reason: one sentence.
-        lent: of an unknown gap, the candidate that gains most and that the held-out rows refuse:
-            what is not yet in the model may be why. None where there is none.
-    """
-
-    verdict: GapVerdict
-    chosen: CandidateFit | None
-    alternatives: tuple[tuple[str, str], ...]
+    verdict: GapVerdict  # none, named, ambiguous or unknown
+    chosen: CandidateFit | None  # the best candidate of the catalogue, or None
+    alternatives: tuple[tuple[str, str], ...]  # places and effects that cannot be told from it
+    # whether the alternatives are its twins or its family, so that adding it serves for all of them
     inseparable: bool
-    reason: str
+    reason: str  # one sentence
+    # of an unknown gap, the candidate that gains most and that the held-out rows refuse: what is
+    # not yet in the model may be why. None where there is none
     lent: CandidateFit | None = None
 
     @property

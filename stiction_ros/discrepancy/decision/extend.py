@@ -28,16 +28,11 @@ TANGENT = 0.25  # steps of a search, by which figures are varied to see what the
 
 @dataclasses.dataclass(frozen=True)
 class AddedEffect:
-    """One effect that became part of the model.
+    """One effect that became part of the model."""
 
-    Attributes:
-        fit: its last fit, with every other added effect in place.
-        behaviour: with its figures.
-        alternatives: places and effects that the record does not tell from it.
-    """
-
-    fit: CandidateFit
-    behaviour: Behaviour
+    fit: CandidateFit  # its last fit, with every other added effect in place
+    behaviour: Behaviour  # with its figures
+    # places and effects that the record does not tell from it
     alternatives: tuple[tuple[str, str], ...]
 
     @property
@@ -53,19 +48,12 @@ class AddedEffect:
 
 @dataclasses.dataclass(frozen=True)
 class Extension:
-    """The model after one more effect.
+    """The model after one more effect."""
 
-    Attributes:
-        added: all effects that stayed.
-        base: of the model with them.
-        kept: whether the last effect stayed.
-        reason: why it did not.
-    """
-
-    added: tuple[AddedEffect, ...]
-    base: Baseline
-    kept: bool
-    reason: str
+    added: tuple[AddedEffect, ...]  # all effects that stayed
+    base: Baseline  # of the model with them
+    kept: bool  # whether the last effect stayed
+    reason: str  # why it did not
 
 
 def extend(

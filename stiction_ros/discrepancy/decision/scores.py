@@ -26,17 +26,11 @@ Progress = Callable[[float], None]
 
 @dataclasses.dataclass(frozen=True)
 class Scores:
-    """All candidates at their best, the best one first.
+    """All candidates at their best, the best one first."""
 
-    Attributes:
-        base: the current model.
-        candidates: what was tried, one entry per behaviour and law.
-        fits: one per candidate, sorted by ``delta_bic``.
-    """
-
-    base: Baseline
-    candidates: tuple[Candidate, ...]
-    fits: tuple[CandidateFit, ...]
+    base: Baseline  # the current model
+    candidates: tuple[Candidate, ...]  # what was tried, one entry per behaviour and law
+    fits: tuple[CandidateFit, ...]  # one per candidate, sorted by ``delta_bic``
 
     def of(self, place: str, effect: str) -> CandidateFit | None:
         """Return the best fit of an effect, its twins' included; None when not tried."""
@@ -94,20 +88,13 @@ def score_candidates(
 
 @dataclasses.dataclass(frozen=True)
 class Testable:
-    """Whether one effect of engineering size would be seen.
+    """Whether one effect of engineering size would be seen."""
 
-    Attributes:
-        place, effect: as loop models name them.
-        expected: BIC that it would gain on this record.
-        testable: whether that beats the margin.
-        experiment: what would make it testable.
-    """
-
-    place: str
+    place: str  # place, effect: as loop models name them
     effect: str
-    expected: float
-    testable: bool
-    experiment: str
+    expected: float  # BIC that it would gain on this record
+    testable: bool  # whether that beats the margin
+    experiment: str  # what would make it testable
 
 
 def testable_effects(

@@ -29,24 +29,17 @@ _FIRST_GUESSES = (None, np.array([0.99]))  # white and slow: the turns may end i
 
 @dataclasses.dataclass(frozen=True)
 class Baseline:
-    """The current model alone: its gap, its noise, and what every fit shares.
+    """The current model alone: its gap, its noise, and what every fit shares."""
 
-    Attributes:
-        run: the free run.
-        columns: per output the columns that every fit projects out, shape (N, q).
-        blocks: per output the fitted and the held-out rows.
-        noise: per output the fit of the gap without any change.
-        plain: the same as if nothing were rounded, for the search.
-        declared: per output φ of the noise that the model declares; none where it declares none.
-        known: what was computed of it and may be asked for again, by name.
-    """
-
-    run: FreeRun
+    run: FreeRun  # the free run
+    # per output the columns that every fit projects out, shape (N, q)
     columns: tuple[FloatArray, ...]
-    blocks: tuple[Blocks, ...]
-    noise: tuple[NoiseFit, ...]
-    plain: tuple[NoiseFit, ...]
+    blocks: tuple[Blocks, ...]  # per output the fitted and the held-out rows
+    noise: tuple[NoiseFit, ...]  # per output the fit of the gap without any change
+    plain: tuple[NoiseFit, ...]  # the same as if nothing were rounded, for the search
+    # per output φ of the noise that the model declares; none where it declares none
     declared: tuple[tuple[FloatArray, ...], ...]
+    # what was computed of it and may be asked for again, by name
     known: dict[tuple[object, ...], Any] = dataclasses.field(
         default_factory=dict, init=False, repr=False, compare=False
     )

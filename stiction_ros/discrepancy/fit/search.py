@@ -49,24 +49,15 @@ Under = Mapping[int, FloatArray]  # φ of an output's noise
 
 @dataclasses.dataclass(frozen=True)
 class CandidateFit:
-    """One candidate at its best.
+    """One candidate at its best."""
 
-    Attributes:
-        candidate: which.
-        point: searched figures, shape (axes,).
-        factors: figures found by least squares, shape (s,).
-        noise: per output that it touches, the noise that is left.
-        delta_bic: by how much it beats the current model alone on the training rows; negative
-            when it does not.
-        held_gain: −2 log likelihood that it gains on the held-out rows, with the figures of
-            the training rows.
-    """
-
-    candidate: Candidate
-    point: FloatArray
-    factors: FloatArray
-    noise: Mapping[int, NoiseFit]
+    candidate: Candidate  # which
+    point: FloatArray  # searched figures, shape (axes,)
+    factors: FloatArray  # figures found by least squares, shape (s,)
+    noise: Mapping[int, NoiseFit]  # per output that it touches, the noise that is left
+    # by how much it beats the current model alone on the training rows; negative when it does not
     delta_bic: float
+    # −2 log likelihood that it gains on the held-out rows, with the figures of the training rows
     held_gain: float
 
     @property

@@ -32,15 +32,10 @@ SHOWN = 20
 
 @dataclasses.dataclass(frozen=True)
 class Region:
-    """Points that the likelihood does not reject.
+    """Points that the likelihood does not reject."""
 
-    Attributes:
-        points: values, shape (K, axes).
-        excess: of −2 log likelihood over the least one, shape (K,).
-    """
-
-    points: FloatArray
-    excess: FloatArray
+    points: FloatArray  # values, shape (K, axes)
+    excess: FloatArray  # of −2 log likelihood over the least one, shape (K,)
 
     @classmethod
     def around(cls, base: Baseline, fit: CandidateFit) -> Region:

@@ -15,21 +15,13 @@ from stiction_ros.signals.autoregression import whiten
 
 @dataclasses.dataclass(frozen=True)
 class OutputGap:
-    """The gap of one output on the held-out rows, units of the output.
+    """The gap of one output on the held-out rows, units of the output."""
 
-    Attributes:
-        name: tag.
-        free_run_rmse: of PV less the free run.
-        one_step_rmse: of the innovations.
-        floor_free_run: stationary standard deviation of the AR noise.
-        floor_one_step: standard deviation of its innovations on the fitted rows.
-    """
-
-    name: str
-    free_run_rmse: float
-    one_step_rmse: float
-    floor_free_run: float
-    floor_one_step: float
+    name: str  # tag
+    free_run_rmse: float  # of PV less the free run
+    one_step_rmse: float  # of the innovations
+    floor_free_run: float  # stationary standard deviation of the AR noise
+    floor_one_step: float  # standard deviation of its innovations on the fitted rows
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``gap --json``."""

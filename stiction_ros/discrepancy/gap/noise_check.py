@@ -20,25 +20,17 @@ SOME_STEPS = 3.0  # of the rounding
 
 @dataclasses.dataclass(frozen=True)
 class OutputNoise:
-    """The noise of one output, units of the output.
+    """The noise of one output, units of the output."""
 
-    Attributes:
-        name: tag.
-        declared: standard deviation of the innovations as the model has it; NaN where the
-            model declares none.
-        expected: of those that the declared noise and what the sensor does to the values, such as
-            rounding, make together; NaN where none is declared.
-        found: of those that the answer leaves, under the declared form.
-        disagrees: whether they are larger than declared, or depend on each other.
-        memory: samples after which the strongest dependence comes; 0 where there is none.
-    """
-
-    name: str
+    name: str  # tag
+    # standard deviation of the innovations as the model has it; NaN where the model declares none
     declared: float
+    # of those that the declared noise and what the sensor does to the values, such as rounding,
+    # make together; NaN where none is declared
     expected: float
-    found: float
-    disagrees: bool
-    memory: int
+    found: float  # of those that the answer leaves, under the declared form
+    disagrees: bool  # whether they are larger than declared, or depend on each other
+    memory: int  # samples after which the strongest dependence comes; 0 where there is none
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``gap --json``; a missing declaration is null."""

@@ -38,21 +38,14 @@ NO_LAW = 30.0  # BIC by which a law may miss an autoregression and still be its 
 
 @dataclasses.dataclass(frozen=True)
 class NoiseEffect:
-    """One law of a larger noise at its best.
+    """One law of a larger noise at its best."""
 
-    Attributes:
-        place, behaviour: as loop models name them.
-        intervals: 95 % of each figure.
-        score: −2 log likelihood of fitted and held-out rows, and the price of its figures as
-            of an effect.
-        innovation_std: of what it leaves, units of the output.
-    """
-
-    place: str
+    place: str  # place, behaviour: as loop models name them
     behaviour: Behaviour
-    intervals: dict[str, tuple[float, float]]
+    intervals: dict[str, tuple[float, float]]  # 95 % of each figure
+    # −2 log likelihood of fitted and held-out rows, and the price of its figures as of an effect
     score: float
-    innovation_std: float
+    innovation_std: float  # of what it leaves, units of the output
 
 
 def noise_effects(

@@ -33,20 +33,14 @@ FLOOR = 1e-6  # of the declared variance, that every measurement has
 
 @dataclasses.dataclass(frozen=True)
 class Block:
-    """States of a noise.
+    """States of a noise."""
 
-    Attributes:
-        a, q: shape (n, n).
-        c: what is seen of them, shape (n,).
-        start: their covariance at the first sample; what is left open of it is a free column.
-        r: variance of a white part.
-    """
-
-    a: FloatArray
+    a: FloatArray  # a, q: shape (n, n)
     q: FloatArray
-    c: FloatArray
+    c: FloatArray  # what is seen of them, shape (n,)
+    # their covariance at the first sample; what is left open of it is a free column
     start: FloatArray
-    r: float = 0.0
+    r: float = 0.0  # variance of a white part
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,20 +48,13 @@ class Law:
     """A noise by the logarithms of its figures: its states beside those of the declared one.
 
     The first figure is a size. It has no upper bound: the declared noise may be nothing beside it.
-
-    Attributes:
-        place: where it enters, as loop models name it.
-        starts: figures with which their search begins.
-        range: the lowest and the highest figures.
-        block: its states by its figures.
-        behaviour: by its figures, too.
     """
 
-    place: str
-    starts: list[FloatArray]
-    range: tuple[FloatArray, FloatArray]
-    block: Callable[[FloatArray], Block]
-    behaviour: Callable[[FloatArray], Behaviour]
+    place: str  # where it enters, as loop models name it
+    starts: list[FloatArray]  # figures with which their search begins
+    range: tuple[FloatArray, FloatArray]  # the lowest and the highest figures
+    block: Callable[[FloatArray], Block]  # its states by its figures
+    behaviour: Callable[[FloatArray], Behaviour]  # by its figures, too
 
 
 def white_block(variance: float) -> Block:
@@ -184,17 +171,11 @@ CLOSE, FLAT, TURNS = 1e-2, 0.05, 60  # of the search: figures, their likelihood,
 
 @dataclasses.dataclass(frozen=True)
 class Shown:
-    """What is judged: the gap and the columns that every fit projects out.
+    """What is judged: the gap and the columns that every fit projects out."""
 
-    Attributes:
-        values: shape (1 + q, N).
-        seen: rows that are measurements, shape (N,).
-        begins: first rows of records, shape (N,).
-    """
-
-    values: FloatArray
-    seen: BoolArray
-    begins: BoolArray
+    values: FloatArray  # shape (1 + q, N)
+    seen: BoolArray  # rows that are measurements, shape (N,)
+    begins: BoolArray  # first rows of records, shape (N,)
 
 
 def shown_of(base: Baseline, output: int) -> Shown:

@@ -21,32 +21,20 @@ STRONG = 0.5  # share of the gap's variance
 
 @dataclasses.dataclass(frozen=True)
 class Track:
-    """A slow disturbance at one place that would close the gap, smoothed.
+    """A slow disturbance at one place that would close the gap, smoothed."""
 
-    Attributes:
-        place: ``valve:TAG`` or ``disturbance:TAG``.
-        wave: shape (N,), % at a valve, units of the output at a disturbance.
-        gain: −2 log likelihood that it gains, less two per degree of freedom that it uses.
-    """
-
-    place: str
-    wave: FloatArray
-    gain: float
+    place: str  # ``valve:TAG`` or ``disturbance:TAG``
+    wave: FloatArray  # shape (N,), % at a valve, units of the output at a disturbance
+    gain: float  # −2 log likelihood that it gains, less two per degree of freedom that it uses
 
 
 @dataclasses.dataclass(frozen=True)
 class Where:
-    """Where the gap of one model is.
+    """Where the gap of one model is."""
 
-    Attributes:
-        sentences: for people.
-        tracks: one per place, the one that gains most first.
-        lines: strongest period of the gap per output, s.
-    """
-
-    sentences: tuple[str, ...]
-    tracks: tuple[Track, ...]
-    lines: tuple[float, ...]
+    sentences: tuple[str, ...]  # for people
+    tracks: tuple[Track, ...]  # one per place, the one that gains most first
+    lines: tuple[float, ...]  # strongest period of the gap per output, s
 
 
 def locate(base: Baseline) -> Where:

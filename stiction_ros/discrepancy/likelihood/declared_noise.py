@@ -26,14 +26,10 @@ class DeclaredNoise:
     White noise of the equation leaves :math:`r = v / A(q)` behind a free run, noise of the
     measurement is left as it is, beside a coloured disturbance it is an autoregression of as
     many terms as count.
-
-    Attributes:
-        std: of the innovations, units of the output.
-        ar: φ of what the free run leaves, shape (p,); p = 0 for noise of the measurement.
     """
 
-    std: float
-    ar: FloatArray
+    std: float  # of the innovations, units of the output
+    ar: FloatArray  # φ of what the free run leaves, shape (p,); p = 0 for noise of the measurement
 
 
 def declared_noise(model: LoopModel) -> tuple[DeclaredNoise | None, ...]:

@@ -38,13 +38,9 @@ VANISHED = 1e-9  # of a column, that whitening leaves of what it takes away
 
 @dataclasses.dataclass(frozen=True)
 class Blocks:
-    """Which samples are fitted and which are kept back.
+    """Which samples are fitted and which are kept back."""
 
-    Attributes:
-        train, held: rows, shape (N,); a row is in at most one of them.
-    """
-
-    train: BoolArray
+    train: BoolArray  # train, held: rows, shape (N,); a row is in at most one of them
     held: BoolArray
 
     @property
@@ -60,32 +56,21 @@ class NoiseFit:
     .. math::
         g_k &= x_k^T \beta + r_k \\
         r_k &= \varphi_1 r_{k-1} + \ldots + \varphi_p r_{k-p} + e_k, \quad p \le 6
-
-    Attributes:
-        ar: φ, shape (p,).
-        innovation_std: of e on the training rows, units of the output.
-        coefficients: β, shape (q,).
-        residual: r, shape (N,).
-        minus_two_log: n (log 2πσ² + 1) on the n training rows.
-        rows: n.
-        held_minus_two_log: −2 log likelihood of the held-out rows with the trained figures;
-            innovations beyond 5 σ count as 5 σ, so that no single row outweighs all others.
-        held_rows: their number.
-        price: what its φ cost in BIC; nothing for those that the model declares.
-        enlarged: whether it is another noise than the one that the model declares.
-        short: φ of the autoregression that it is better than; None where it is one itself.
     """
 
-    ar: FloatArray
-    innovation_std: float
-    coefficients: FloatArray
-    residual: FloatArray
-    minus_two_log: float
-    rows: int
+    ar: FloatArray  # φ, shape (p,)
+    innovation_std: float  # of e on the training rows, units of the output
+    coefficients: FloatArray  # β, shape (q,)
+    residual: FloatArray  # r, shape (N,)
+    minus_two_log: float  # n (log 2πσ² + 1) on the n training rows
+    rows: int  # n
+    # −2 log likelihood of the held-out rows with the trained figures; innovations beyond 5 σ count
+    # as 5 σ, so that no single row outweighs all others
     held_minus_two_log: float
-    held_rows: int
-    price: float
-    enlarged: bool = False
+    held_rows: int  # their number
+    price: float  # what its φ cost in BIC; nothing for those that the model declares
+    enlarged: bool = False  # whether it is another noise than the one that the model declares
+    # φ of the autoregression that it is better than; None where it is one itself
     short: FloatArray | None = None
 
     @property

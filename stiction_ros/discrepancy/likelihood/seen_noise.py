@@ -24,15 +24,10 @@ from stiction_ros.signals.autoregression import companion
 
 @dataclasses.dataclass(frozen=True)
 class Unseen:
-    """What may act beside the recorded OP of a valve.
+    """What may act beside the recorded OP of a valve."""
 
-    Attributes:
-        variance: %².
-        keep: correlation of neighbouring samples, 0 (white) to 1.
-    """
-
-    variance: float
-    keep: float = 0.0
+    variance: float  # %²
+    keep: float = 0.0  # correlation of neighbouring samples, 0 (white) to 1
 
 
 def seen_noise(

@@ -31,24 +31,16 @@ NEAR = 0.99  # of the largest change, from which on a figure lies on its bound
 
 @dataclasses.dataclass(frozen=True)
 class ProcessChange:
-    """One figure of the process that is another than the model says.
+    """One figure of the process that is another than the model says."""
 
-    Attributes:
-        output: tag.
-        what: ``gain``, ``time_constant``, ``lead`` (the time constant of a zero) or ``delay``.
-        value: factor of the gain or of a time constant; seconds of dead time beyond the
-            model's, negative for less.
-        interval: 95 %.
-        unit: of the value.
-        model: the model's own time constant, s; None for the others.
-    """
-
-    output: str
-    what: str
+    output: str  # tag
+    what: str  # ``gain``, ``time_constant``, ``lead`` (the time constant of a zero) or ``delay``
+    # factor of the gain or of a time constant; seconds of dead time beyond the model's, negative
+    # for less
     value: float
-    interval: tuple[float, float]
-    unit: str
-    model: float | None = None
+    interval: tuple[float, float]  # 95 %
+    unit: str  # of the value
+    model: float | None = None  # the model's own time constant, s; None for the others
 
     @property
     def sentence(self) -> str:
@@ -76,18 +68,13 @@ class ProcessChange:
 
 @dataclasses.dataclass(frozen=True)
 class ChangedProcess:
-    """A model whose process follows the records better.
+    """A model whose process follows the records better."""
 
-    Attributes:
-        model: without effects.
-        changes: figures that were changed.
-        effects: that stand beside it, those that are smooth at their best behind it.
-        slopes: per output what a unit of each figure that was changed moves, shape (N, figures).
-    """
-
-    model: LoopModel
-    changes: tuple[ProcessChange, ...]
+    model: LoopModel  # without effects
+    changes: tuple[ProcessChange, ...]  # figures that were changed
+    # that stand beside it, those that are smooth at their best behind it
     effects: tuple[AddedEffect, ...]
+    # per output what a unit of each figure that was changed moves, shape (N, figures)
     slopes: tuple[FloatArray, ...]
 
 

@@ -68,19 +68,12 @@ class Fitted:
 
 @dataclasses.dataclass(frozen=True)
 class Problem:
-    """One output and the stems that drive it.
+    """One output and the stems that drive it."""
 
-    Attributes:
-        y: PV less what disturbances and sensors add, shape (N,).
-        stems: shape (N, m), %.
-        runs: the records end to end.
-        blocks: rows that are fitted, rows that are kept back.
-    """
-
-    y: FloatArray
-    stems: FloatArray
-    runs: Runs
-    blocks: Blocks
+    y: FloatArray  # PV less what disturbances and sensors add, shape (N,)
+    stems: FloatArray  # shape (N, m), %
+    runs: Runs  # the records end to end
+    blocks: Blocks  # rows that are fitted, rows that are kept back
 
     def each(
         self, values: FloatArray, numerator: FloatArray, denominator: FloatArray

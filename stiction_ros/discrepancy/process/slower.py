@@ -25,16 +25,11 @@ class Held:
     r"""One path of an equation in continuous time, in samples.
 
     .. math:: G(s) = \frac{n_0 + n_1 s + \ldots}{\prod_i (s - p_i)} e^{-f s}
-
-    Attributes:
-        poles: p, shape (n,).
-        numerator: n₀ …, shape (n,).
-        fraction: f, the dead time beyond whole samples, 0 to 1.
     """
 
-    poles: ComplexArray
-    numerator: FloatArray
-    fraction: float
+    poles: ComplexArray  # p, shape (n,)
+    numerator: FloatArray  # n₀ …, shape (n,)
+    fraction: float  # f, the dead time beyond whole samples, 0 to 1
 
     def sampled(self) -> FloatArray:
         """Return b of the sampled equation, shape (n + 1,)."""
@@ -153,23 +148,16 @@ SHORTEST = 1.0  # sample, of a time constant that counts
 
 @dataclasses.dataclass(frozen=True)
 class Figure:
-    """One figure of an equation that may be off.
+    """One figure of an equation that may be off."""
 
-    Attributes:
-        what: ``gain``, ``time_constant``, ``lead`` or ``delay``.
-        least, most: the largest changes, a share of the model's figure, of a delay in samples. With
-            the least one a delay, a time constant or a lead is gone.
-        roots: which poles or zeros it moves; a pair moves together.
-        valve: whose zeros; None for poles.
-        lasts: time constant, samples; None for gain and delay.
-    """
-
-    what: str
+    what: str  # ``gain``, ``time_constant``, ``lead`` or ``delay``
+    # least, most: the largest changes, a share of the model's figure, of a delay in samples. With
+    # the least one a delay, a time constant or a lead is gone
     least: float
     most: float
-    roots: tuple[int, ...] = ()
-    valve: int | None = None
-    lasts: float | None = None
+    roots: tuple[int, ...] = ()  # which poles or zeros it moves; a pair moves together
+    valve: int | None = None  # whose zeros; None for poles
+    lasts: float | None = None  # time constant, samples; None for gain and delay
 
     @property
     def probe(self) -> float:

@@ -34,40 +34,30 @@ SMALL = 0.01  # %, of a move by which a process that is not linear is asked for 
 
 @dataclasses.dataclass(frozen=True)
 class Runs:
-    """Records of one loop laid end to end; nothing reaches from one into the next.
+    """Records of one loop laid end to end; nothing reaches from one into the next."""
 
-    Attributes:
-        records: at least one, of one loop.
-        op: shape (N, m), %, within the limits of the valves.
-        pv: shape (N, p).
-        time: seconds since the first sample of the own record, shape (N,).
-        slices: rows of each record.
-        usable: per output the rows whose PV can be scored, shape (p, N).
-        quanta: per output the step of a coarse rounding; 0 where there is none.
-        lattices: per output the distance of PV's values, however fine; 0 where there is none.
-        filled: per output the rows whose PV a historian filled in between the values that it kept,
-            shape (p, N).
-        unseen: per valve what may act beside the recorded OP; empty where nothing does.
-        between: per valve whether it is left open how late within a sample an effect that is added
-            moves its stem; empty where that is not asked.
-        scans: OP at the two scans of each sample, shape (2 N, m), %; a stem slips by either. None
-            where a sample holds one OP.
-        phases: of the blocks of each record that are kept back, each of :data:`PHASES`; by turns
-            where none are given.
-    """
-
-    records: tuple[Record, ...]
-    op: FloatArray
-    pv: FloatArray
-    time: FloatArray
-    slices: tuple[slice, ...]
-    usable: BoolArray
-    quanta: tuple[float, ...]
+    records: tuple[Record, ...]  # at least one, of one loop
+    op: FloatArray  # shape (N, m), %, within the limits of the valves
+    pv: FloatArray  # shape (N, p)
+    time: FloatArray  # seconds since the first sample of the own record, shape (N,)
+    slices: tuple[slice, ...]  # rows of each record
+    usable: BoolArray  # per output the rows whose PV can be scored, shape (p, N)
+    quanta: tuple[float, ...]  # per output the step of a coarse rounding; 0 where there is none
+    # per output the rows whose PV a historian filled in between the values that it kept, shape (p,
+    # N)
     filled: BoolArray
+    # per output the distance of PV's values, however fine; 0 where there is none
     lattices: tuple[float, ...]
+    # per valve what may act beside the recorded OP; empty where nothing does
     unseen: tuple[tuple[Unseen, ...], ...] = ()
+    # per valve whether it is left open how late within a sample an effect that is added moves its
+    # stem; empty where that is not asked
     between: tuple[bool, ...] = ()
+    # OP at the two scans of each sample, shape (2 N, m), %; a stem slips by either. None where a
+    # sample holds one OP
     scans: FloatArray | None = None
+    # of the blocks of each record that are kept back, each of ``PHASES``; by turns where none are
+    # given
     phases: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:

@@ -72,13 +72,9 @@ def tank_states(
 
 
 class Responses(ABC):
-    """What a process makes of stem positions; state and level at the start are free columns.
+    """What a process makes of stem positions; state and level at the start are free columns."""
 
-    Attributes:
-        skip: first samples of a run that depend on stems before it.
-    """
-
-    skip: int
+    skip: int  # first samples of a run that depend on stems before it
 
     @abstractmethod
     def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:

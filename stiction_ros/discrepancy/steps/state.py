@@ -22,59 +22,38 @@ from stiction_ros.loop import LoopModel
 
 @dataclasses.dataclass(frozen=True)
 class Task:
-    """What all steps of a run are given.
+    """What all steps of a run are given."""
 
-    Attributes:
-        model: as it was given.
-        options: of the run.
-        gate, controller, data: what the data themselves show.
-        runs: the records end to end.
-        random: source of the bootstraps, drawn from in the order of the steps.
-        report: called with the share done.
-        begun: of the clock, s.
-    """
-
-    model: LoopModel
-    options: GapOptions
-    gate: Gate
+    model: LoopModel  # as it was given
+    options: GapOptions  # of the run
+    gate: Gate  # gate, controller, data: what the data themselves show
     controller: ControllerCheck
     data: tuple[DataFinding, ...]
-    runs: Runs
-    random: np.random.Generator
-    report: Progress
-    begun: float
+    runs: Runs  # the records end to end
+    random: np.random.Generator  # source of the bootstraps, drawn from in the order of the steps
+    report: Progress  # called with the share done
+    begun: float  # of the clock, s
 
 
 @dataclasses.dataclass(frozen=True)
 class State:
-    """What is believed of a loop.
+    """What is believed of a loop."""
 
-    Attributes:
-        given: the model without any effect that was added, its process as it was given.
-        bare: the same, its process as it is taken now.
-        changes: what of the process is another than given.
-        slopes: per output what a unit of each figure that was changed moves, shape (N, q).
-        before, base: free runs without and with what was added.
-        added: effects that are in the model, in the order in which they were found.
-        earlier: ``bare`` before each of them came, as long as they may be taken back.
-        looks: the rounds so far.
-        opened: the first look at the process as it is now.
-        testable: what the last look could have seen.
-        doubted: what is believed without the first effect that was added in doubt; None where none
-            was.
-    """
-
-    given: LoopModel
-    bare: LoopModel
-    before: Baseline
+    given: LoopModel  # the model without any effect that was added, its process as it was given
+    bare: LoopModel  # the same, its process as it is taken now
+    before: Baseline  # before, base: free runs without and with what was added
     base: Baseline
-    changes: tuple[ProcessChange, ...] = ()
+    changes: tuple[ProcessChange, ...] = ()  # what of the process is another than given
+    # per output what a unit of each figure that was changed moves, shape (N, q)
     slopes: tuple[FloatArray, ...] = ()
+    # effects that are in the model, in the order in which they were found
     added: tuple[AddedEffect, ...] = ()
+    # ``bare`` before each of them came, as long as they may be taken back
     earlier: tuple[LoopModel, ...] = ()
-    looks: tuple[Look, ...] = ()
-    opened: int = 0
-    testable: tuple[Testable, ...] = ()
+    looks: tuple[Look, ...] = ()  # the rounds so far
+    opened: int = 0  # the first look at the process as it is now
+    testable: tuple[Testable, ...] = ()  # what the last look could have seen
+    # what is believed without the first effect that was added in doubt; None where none was
     doubted: State | None = None
 
     def others(self, k: int) -> tuple[AddedEffect, ...]:

@@ -31,19 +31,12 @@ SINGLES = 4  # effects of the first look that are tried alone against several to
 
 @dataclasses.dataclass(frozen=True)
 class Whole:
-    """One explanation: the effects of a model, and the noise that is left.
+    """One explanation: the effects of a model, and the noise that is left."""
 
-    Attributes:
-        effects: fitted together.
-        base: of the model with them.
-        score: −2 log likelihood of fitted and held-out rows, and the price of all figures.
-        laws: places and effects by which its larger noise is told, where that is better.
-    """
-
-    effects: tuple[AddedEffect, ...]
-    base: Baseline
-    score: float
-    laws: Keys = ()
+    effects: tuple[AddedEffect, ...]  # fitted together
+    base: Baseline  # of the model with them
+    score: float  # −2 log likelihood of fitted and held-out rows, and the price of all figures
+    laws: Keys = ()  # places and effects by which its larger noise is told, where that is better
 
     def worth(self, margin: float) -> float:
         """Return what is to be least: an effect more must gain the margin."""
@@ -148,17 +141,12 @@ def _in_doubt(effect: AddedEffect, rivals: Sequence[Keys]) -> AddedEffect:
 
 @dataclasses.dataclass(frozen=True)
 class Mended:
-    """An explanation behind a process that was changed.
+    """An explanation behind a process that was changed."""
 
-    Attributes:
-        changed: the process.
-        whole: the effects behind it.
-        worth: as of a whole, the changes included: together they have to gain the margin, and
-            each figure has its price.
-    """
-
-    changed: ChangedProcess
-    whole: Whole
+    changed: ChangedProcess  # the process
+    whole: Whole  # the effects behind it
+    # as of a whole, the changes included: together they have to gain the margin, and each figure
+    # has its price
     worth: float
 
 

@@ -25,18 +25,12 @@ class LoopKind(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Expected:
-    """How a PV of one kind answers its valve.
+    """How a PV of one kind answers its valve."""
 
-    Attributes:
-        fastest, slowest: s until 63 % of the answer, dead time included.
-        settles: whether it settles; None where both occur.
-        why: half a sentence.
-    """
-
-    fastest: float
+    fastest: float  # fastest, slowest: s until 63 % of the answer, dead time included
     slowest: float
-    settles: bool | None
-    why: str
+    settles: bool | None  # whether it settles; None where both occur
+    why: str  # half a sentence
 
 
 EXPECTED: Mapping[LoopKind, Expected] = {

@@ -20,24 +20,16 @@ GROWS = 1.5
 
 @dataclasses.dataclass(frozen=True)
 class StepAnswer:
-    """The answer to 1 % of stem.
+    """The answer to 1 % of stem."""
 
-    Attributes:
-        output: tag.
-        dead_time: s, until PV begins to answer: the delay and the sample that shows it.
-        lag: s from then on until 63 % of the answer; None where it does not settle within half the
-            record, which cannot be told from an integrator.
-        values: PV after each sample, engineering units per %, shape (H,).
-        noise: standard deviation of what one sample of PV brings that is new, same units.
-        sample_time: s.
-    """
-
-    output: str
-    dead_time: float
+    output: str  # tag
+    dead_time: float  # s, until PV begins to answer: the delay and the sample that shows it
+    # s from then on until 63 % of the answer; None where it does not settle within half the record,
+    # which cannot be told from an integrator
     lag: float | None
-    values: FloatArray
-    noise: float
-    sample_time: float
+    values: FloatArray  # PV after each sample, engineering units per %, shape (H,)
+    noise: float  # standard deviation of what one sample of PV brings that is new, same units
+    sample_time: float  # s
 
     @classmethod
     def of(cls, model: OutputModel, valve: str, samples: int, sample_time: float) -> StepAnswer:

@@ -55,62 +55,45 @@ LONG_HOLD = 0.5
 
 @dataclasses.dataclass(frozen=True)
 class ValveLoop:
-    """One valve in its loop.
+    """One valve in its loop."""
 
-    Attributes:
-        valve: its tag.
-        output: tag of the output that its controller reads; empty when none was found.
-        reason: why the loop could not be closed, one sentence; empty when it could.
-        controller: as recovered, in the units of the record; None where no output fits.
-        oscillation: of OP, %; None where there is none to speak of.
-        ringing: of the loop without friction, the least damped first.
-        ringing_beside: the same for the process beside a wave at the period of the cycle, see
-            :func:`.outside_line.beside`.
-        driven: share of OP's movement, 0 to 1, that the loop without friction makes of the
-            recorded set-point alone.
-        band_share: f_S + f_D over the width of OP's movement about its slow mean.
-        moved_with, moved_without: movement of OP over the recorded one when the record is
-            repeated with its noise, with the friction and without; see :class:`.Moved`.
-        gone: share of the movement of OP, or of PV − SP, that goes away with the friction.
-        before: a line from outside in OP, beside what comes from PV.
-        outside: a line from outside in PV, beside what comes from the stem.
-    """
-
-    valve: str
-    output: str
-    reason: str
+    valve: str  # its tag
+    output: str  # tag of the output that its controller reads; empty when none was found
+    reason: str  # why the loop could not be closed, one sentence; empty when it could
+    # as recovered, in the units of the record; None where no output fits
     controller: RecoveredController | None = None
-    oscillation: Oscillation | None = None
-    ringing: tuple[Ringing, ...] = ()
+    oscillation: Oscillation | None = None  # of OP, %; None where there is none to speak of
+    ringing: tuple[Ringing, ...] = ()  # of the loop without friction, the least damped first
+    # the same for the process beside a wave at the period of the cycle, see ``outside_line.beside``
     ringing_beside: tuple[Ringing, ...] = ()
+    # share of OP's movement, 0 to 1, that the loop without friction makes of the recorded set-point
+    # alone
     driven: float = 0.0
-    band_share: float = 0.0
+    band_share: float = 0.0  # f_S + f_D over the width of OP's movement about its slow mean
+    # moved_with, moved_without: movement of OP over the recorded one when the record is repeated
+    # with its noise, with the friction and without; see ``Moved``
     moved_with: float = 0.0
     moved_without: float = 0.0
+    # share of the movement of OP, or of PV − SP, that goes away with the friction
     gone: float = 0.0
-    before: OutsideLine = NO_LINE
-    outside: OutsideLine = NO_LINE
+    before: OutsideLine = NO_LINE  # a line from outside in OP, beside what comes from PV
+    outside: OutsideLine = NO_LINE  # a line from outside in PV, beside what comes from the stem
 
 
 @dataclasses.dataclass(frozen=True)
 class OutputLoop:
-    """One output in its loop.
+    """One output in its loop."""
 
-    Attributes:
-        name: its tag.
-        oscillation: of PV − SP, engineering units; None where there is no room for one.
-        after: a line from outside in PV at this period, beside what comes from the stems.
-        alone: the same beside what comes from valves that follow OP.
-        set_point: how the recorded set-point oscillates; None where it does not, or there is none.
-        set_point_line: line of the recorded set-point at this period over that of PV; None
-            where no set-point was recorded.
-    """
-
-    name: str
+    name: str  # its tag
+    # of PV − SP, engineering units; None where there is no room for one
     oscillation: Oscillation | None
+    # a line from outside in PV at this period, beside what comes from the stems
     after: OutsideLine = NO_LINE
-    alone: OutsideLine = NO_LINE
+    alone: OutsideLine = NO_LINE  # the same beside what comes from valves that follow OP
+    # how the recorded set-point oscillates; None where it does not, or there is none
     set_point: Oscillation | None = None
+    # line of the recorded set-point at this period over that of PV; None where no set-point was
+    # recorded
     set_point_line: float | None = None
 
     @property

@@ -49,45 +49,29 @@ def law_of(valve: ValveEstimate) -> tuple[float, float, float]:
 
 @dataclasses.dataclass(frozen=True)
 class Moved:
-    """How a loop moves when its record is repeated, between moves of its set-point.
+    """How a loop moves when its record is repeated, between moves of its set-point."""
 
-    Attributes:
-        with_friction, without_friction: movement of OP over the recorded one.
-        gone: share that goes away with the friction, of OP's movement or of that of PV − SP,
-            whichever is more: a controller that passes noise on to the valve moves OP anyway,
-            and one that is slow hardly moves it at all.
-    """
-
-    with_friction: float
+    with_friction: float  # with_friction, without_friction: movement of OP over the recorded one
     without_friction: float
+    # share that goes away with the friction, of OP's movement or of that of PV − SP, whichever is
+    # more: a controller that passes noise on to the valve moves OP anyway, and one that is slow
+    # hardly moves it at all
     gone: float
 
 
 @dataclasses.dataclass(frozen=True)
 class Repeated:
-    """One loop, ready to be run again and again; everything scaled.
+    """One loop, ready to be run again and again; everything scaled."""
 
-    Attributes:
-        loop: the signals.
-        process: equation (9).
-        frictions: per valve the (f_S, f_D) tried, the estimate first, shape (m, F, 2).
-        laws: per valve, :func:`law_of`, shape (m, 3).
-        pairs: per valve the output of its controller, −1 for none, and the controller.
-        periods: of OP of each valve, samples.
-        simulated: PV of the process driven by the estimated stems, shape (N, p).
-        load: what that leaves of PV, shape (N, p).
-        set_points: recorded, or found with the controllers, shape (N, p).
-    """
-
-    loop: ScaledLoop
-    process: Process
-    frictions: FloatArray
-    laws: FloatArray
-    pairs: Pairs
-    periods: tuple[float, ...]
-    simulated: FloatArray
-    load: FloatArray
-    set_points: FloatArray
+    loop: ScaledLoop  # the signals
+    process: Process  # equation (9)
+    frictions: FloatArray  # per valve the (f_S, f_D) tried, the estimate first, shape (m, F, 2)
+    laws: FloatArray  # per valve, ``law_of``, shape (m, 3)
+    pairs: Pairs  # per valve the output of its controller, −1 for none, and the controller
+    periods: tuple[float, ...]  # of OP of each valve, samples
+    simulated: FloatArray  # PV of the process driven by the estimated stems, shape (N, p)
+    load: FloatArray  # what that leaves of PV, shape (N, p)
+    set_points: FloatArray  # recorded, or found with the controllers, shape (N, p)
 
     @classmethod
     def of(

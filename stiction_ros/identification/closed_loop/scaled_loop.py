@@ -29,28 +29,19 @@ LONGEST = 20_000
 
 @dataclasses.dataclass(frozen=True)
 class ScaledLoop:
-    """Signals of one record, scaled.
+    """Signals of one record, scaled."""
 
-    Attributes:
-        op, stem: shape (N, m), by the same means and scales.
-        pv: shape (N, p).
-        sp: shape (N, p), as PV, or None.
-        stretches: first sample of each stretch in automatic and the one behind its last.
-        op_mean, op_scale: shape (m,), %.
-        pv_mean, pv_scale: shape (p,), engineering units.
-        digits: decimals that are kept of what is scaled alike.
-    """
-
-    op: FloatArray
+    op: FloatArray  # op, stem: shape (N, m), by the same means and scales
     stem: FloatArray
-    pv: FloatArray
-    sp: FloatArray | None
+    pv: FloatArray  # shape (N, p)
+    sp: FloatArray | None  # shape (N, p), as PV, or None
+    # first sample of each stretch in automatic and the one behind its last
     stretches: list[tuple[int, int]]
-    op_mean: FloatArray
+    op_mean: FloatArray  # op_mean, op_scale: shape (m,), %
     op_scale: FloatArray
-    pv_mean: FloatArray
+    pv_mean: FloatArray  # pv_mean, pv_scale: shape (p,), engineering units
     pv_scale: FloatArray
-    digits: int = DIGITS
+    digits: int = DIGITS  # decimals that are kept of what is scaled alike
 
     @property
     def longest(self) -> tuple[int, int]:

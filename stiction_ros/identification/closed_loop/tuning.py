@@ -32,18 +32,13 @@ LEAST_FIT = 0.5  # R² of a controller whose gain is believed: rounded and held 
 
 @dataclasses.dataclass(frozen=True)
 class Tuning:
-    """The controller between an output and a valve.
+    """The controller between an output and a valve."""
 
-    Attributes:
-        valve: index.
-        gain: K_c, of OP over its standard deviation per PV over its own; signed such that the
-            process has the same sign.
-        time: 3 T_i, samples.
-    """
-
-    valve: int
+    valve: int  # index
+    # K_c, of OP over its standard deviation per PV over its own; signed such that the process has
+    # the same sign
     gain: float
-    time: float
+    time: float  # 3 T_i, samples
 
     def reach(self, rate: int, pv_shrunk: float, edges: IntArray) -> Reach:
         """Return what it says of a response in rows.

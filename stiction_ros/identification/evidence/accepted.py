@@ -27,25 +27,20 @@ OUTWARDS = 0.01 * np.arange(1.0, 13.0)
 
 @dataclasses.dataclass(frozen=True)
 class Accepted:
-    """Frictions of one valve, shares of the span of OP.
+    """Frictions of one valve, shares of the span of OP."""
 
-    Attributes:
-        static, dynamic, band: hulls of f_S, f_D and f_S + f_D of what is not rejected.
-        gain: −2 log of the marginal likelihood that the friction of this valve adds to a model in
-            which it has none.
-        deadband_loss: by how much the best f_D = f_S is worse than the best.
-        material_gain: what the best friction adds whose band is above :data:`HARMLESS`; below 0
-            where all such are less likely than none.
-        profile: rows (f_S, least loss above the best), best over f_D.
-    """
-
+    # static, dynamic, band: hulls of f_S, f_D and f_S + f_D of what is not rejected
     static: Interval
     dynamic: Interval
     band: Interval
+    # −2 log of the marginal likelihood that the friction of this valve adds to a model in which it
+    # has none
     gain: float
-    deadband_loss: float
+    deadband_loss: float  # by how much the best f_D = f_S is worse than the best
+    # what the best friction adds whose band is above ``HARMLESS``; below 0 where all such are less
+    # likely than none
     material_gain: float
-    profile: tuple[tuple[float, float], ...]
+    profile: tuple[tuple[float, float], ...]  # rows (f_S, least loss above the best), best over f_D
 
     def times(self, span: float) -> Accepted:
         """Return the same with frictions in % of a valve whose OP has this span, %."""

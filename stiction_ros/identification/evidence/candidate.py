@@ -21,19 +21,12 @@ are stepped for all of them at once, sample by sample."""
 
 @dataclasses.dataclass(frozen=True)
 class Candidate:
-    """Frictions of all valves, and every output under them.
+    """Frictions of all valves, and every output under them."""
 
-    Attributes:
-        friction: rows (f_S, f_D), shares of the span of OP, shape (m, 2).
-        starts: stem before the first sample minus the first OP, the same, shape (m,).
-        stems: scaled, shape (m, n).
-        fits: one per output.
-    """
-
-    friction: FloatArray
-    starts: FloatArray
-    stems: FloatArray
-    fits: tuple[OutputFit, ...]
+    friction: FloatArray  # rows (f_S, f_D), shares of the span of OP, shape (m, 2)
+    starts: FloatArray  # stem before the first sample minus the first OP, the same, shape (m,)
+    stems: FloatArray  # scaled, shape (m, n)
+    fits: tuple[OutputFit, ...]  # one per output
 
     def beginning(self, rows: int) -> Candidate:
         """Return the candidate on the first ``rows`` of a record; what was fitted stays."""
@@ -47,16 +40,11 @@ class Candidate:
 
 @dataclasses.dataclass(frozen=True)
 class Judge:
-    """What judges stems of one valve, all else given.
+    """What judges stems of one valve, all else given."""
 
-    Attributes:
-        problem: the record.
-        valve: index.
-        ways: criteria, one per output, of each way to do it; the best counts.
-    """
-
-    problem: Problem
-    valve: int
+    problem: Problem  # the record
+    valve: int  # index
+    # criteria, one per output, of each way to do it; the best counts
     ways: tuple[tuple[Criterion, ...], ...]
 
     @classmethod

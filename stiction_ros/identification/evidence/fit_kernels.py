@@ -61,23 +61,14 @@ def solved(factor: FloatArray, right: FloatArray) -> tuple[FloatArray, float]:
 
 
 class Known(NamedTuple):
-    """What is known before the record, of several priors.
+    """What is known before the record, of several priors."""
 
-    Attributes:
-        precisions: inverse of K, shape (K, r, r).
-        waves: 1 / variances of sines and cosines of waves, shape (K, 2 H).
-        held: precisions that a response adds whose sum is held, shape (K, r, r).
-        pulls: that it adds to its products with the output, shape (K, r).
-        energies: that it adds to the output's, shape (K,).
-        at: column at which that response begins; below 0 where there is none.
-    """
-
-    precisions: FloatArray
-    waves: FloatArray
-    held: FloatArray
-    pulls: FloatArray
-    energies: FloatArray
-    at: int
+    precisions: FloatArray  # inverse of K, shape (K, r, r)
+    waves: FloatArray  # 1 / variances of sines and cosines of waves, shape (K, 2 H)
+    held: FloatArray  # precisions that a response adds whose sum is held, shape (K, r, r)
+    pulls: FloatArray  # that it adds to its products with the output, shape (K, r)
+    energies: FloatArray  # that it adds to the output's, shape (K,)
+    at: int  # column at which that response begins; below 0 where there is none
 
 
 @compiled_fused
@@ -119,19 +110,12 @@ def evidences_of(
 
 
 class Lines(NamedTuple):
-    """A constant, and sines and cosines, over the rows that count.
+    """A constant, and sines and cosines, over the rows that count."""
 
-    Attributes:
-        rows: the constant, all sines, and all cosines, shape (1 + 2 H, n).
-        before: their values one row earlier, shape (1 + 2 H,).
-        turns: of each sine and its cosine, rad a row, shape (H,).
-        gram: products of the rows with each other, shape (1 + 2 H, 1 + 2 H).
-    """
-
-    rows: FloatArray
-    before: FloatArray
-    turns: FloatArray
-    gram: FloatArray
+    rows: FloatArray  # the constant, all sines, and all cosines, shape (1 + 2 H, n)
+    before: FloatArray  # their values one row earlier, shape (1 + 2 H,)
+    turns: FloatArray  # of each sine and its cosine, rad a row, shape (H,)
+    gram: FloatArray  # products of the rows with each other, shape (1 + 2 H, 1 + 2 H)
 
 
 @compiled_fused
@@ -171,34 +155,21 @@ def beside_lines(past: FloatArray, lines: Lines, edges: IntArray) -> FloatArray:
 
 
 class Given(NamedTuple):
-    """What stands beside one stem in one output, whitened.
+    """What stands beside one stem in one output, whitened."""
 
-    Attributes:
-        noise: monic polynomial D, shape (d + 1,).
-        judged: n, rows that count.
-        lines: a constant and waves from outside.
-        others: stems of the other valves, scaled, shape (m − 1, N).
-        beside: their last M + n + 1 samples, whitened, shape (m − 1, M + n + 1).
-        others_first: :func:`step_products` with their first lag, shape (m − 1, N + M).
-        root: L^-1, with L L^T the products of the lines and of the lags of each of
-            ``others`` with each other and what is known of them before the record, shape (q, q).
-        target: :func:`step_products` with what all these leave of the output, shape (N + M,).
-        pull: that a held response adds to its products with the target, shape (r,).
-        energy: of that and of the prior of what explains the rest.
-        edges: of the groups of lags, shape (r + 1,).
-    """
-
-    noise: FloatArray
-    judged: int
-    lines: Lines
-    others: FloatArray
-    beside: FloatArray
-    others_first: FloatArray
+    noise: FloatArray  # monic polynomial D, shape (d + 1,)
+    judged: int  # n, rows that count
+    lines: Lines  # a constant and waves from outside
+    others: FloatArray  # stems of the other valves, scaled, shape (m − 1, N)
+    beside: FloatArray  # their last M + n + 1 samples, whitened, shape (m − 1, M + n + 1)
+    others_first: FloatArray  # ``step_products`` with their first lag, shape (m − 1, N + M)
+    # L^-1, with L L^T the products of the lines and of the lags of each of ``others`` with each
+    # other and what is known of them before the record, shape (q, q)
     root: FloatArray
-    target: FloatArray
-    pull: FloatArray
-    energy: float
-    edges: IntArray
+    target: FloatArray  # ``step_products`` with what all these leave of the output, shape (N + M,)
+    pull: FloatArray  # that a held response adds to its products with the target, shape (r,)
+    energy: float  # of that and of the prior of what explains the rest
+    edges: IntArray  # of the groups of lags, shape (r + 1,)
 
 
 @compiled_fused

@@ -37,37 +37,26 @@ FEW_MOVES = 2  # of a beginning
 
 @dataclasses.dataclass(frozen=True)
 class Problem:
-    """Signals in their own scale, so that no unit of OP, PV or time changes an answer.
+    """Signals in their own scale, so that no unit of OP, PV or time changes an answer."""
 
-    Attributes:
-        op: about its mean over its span, shape (m, N): all frictions here are shares of the span.
-        pv: means of ``rate`` samples, about their mean over their standard deviation, (p, n).
-        rate: samples of OP per row.
-        laws: friction law of each valve.
-        span: of OP per valve, %, shape (m,).
-        limit: largest f_S per valve, shape (m,).
-        scale: standard deviation of ``op`` per valve, shape (m,).
-        skipped: smallest delay, rows.
-        least_moves: of a stem, fewest of a friction that is judged.
-        further: per valve, values of the law's parameters behind f_S and f_D; empty where it
-            has no others.
-        lines: per output, frequencies of a wave from outside, turns per sample; empty for none.
-        tunings: per output, the controller that reads it; empty where none is known.
-        shrunk: per output, standard deviation of the rows over that of the samples, shape (p,).
-    """
-
+    # about its mean over its span, shape (m, N): all frictions here are shares of the span
     op: FloatArray
+    # means of ``rate`` samples, about their mean over their standard deviation, (p, n)
     pv: FloatArray
-    rate: int
-    laws: tuple[type[FrictionLaw], ...]
-    span: FloatArray
-    limit: FloatArray
-    scale: FloatArray
-    skipped: int = 0
-    least_moves: int = MOVES
+    rate: int  # samples of OP per row
+    laws: tuple[type[FrictionLaw], ...]  # friction law of each valve
+    span: FloatArray  # of OP per valve, %, shape (m,)
+    limit: FloatArray  # largest f_S per valve, shape (m,)
+    scale: FloatArray  # standard deviation of ``op`` per valve, shape (m,)
+    skipped: int = 0  # smallest delay, rows
+    least_moves: int = MOVES  # of a stem, fewest of a friction that is judged
+    # per valve, values of the law's parameters behind f_S and f_D; empty where it has no others
     further: tuple[tuple[float, ...], ...] = ()
+    # per output, frequencies of a wave from outside, turns per sample; empty for none
     lines: tuple[tuple[float, ...], ...] = ()
+    # per output, the controller that reads it; empty where none is known
     tunings: tuple[Tuning | None, ...] = ()
+    # per output, standard deviation of the rows over that of the samples, shape (p,)
     shrunk: FloatArray = dataclasses.field(default_factory=lambda: np.ones(1))
 
     @classmethod

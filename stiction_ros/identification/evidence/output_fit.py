@@ -30,21 +30,14 @@ BEGUN = (FREE, 1, 3, 5)  # reaches from which fits begin that have no neighbours
 
 @dataclasses.dataclass(frozen=True)
 class OutputFit:
-    """One output.
+    """One output."""
 
-    Attributes:
-        noise: monic polynomial D, shape (d + 1,).
-        prior: of the responses.
-        loss: −2 log of the marginal likelihood, up to a constant of the rows.
-        responses: of the scaled output to the scaled stems, levels of the groups of taps, (m, r).
-        rest: what the free run leaves of the output, shape (n,).
-    """
-
-    noise: FloatArray
-    prior: ResponsePrior
-    loss: float
+    noise: FloatArray  # monic polynomial D, shape (d + 1,)
+    prior: ResponsePrior  # of the responses
+    loss: float  # −2 log of the marginal likelihood, up to a constant of the rows
+    # of the scaled output to the scaled stems, levels of the groups of taps, (m, r)
     responses: FloatArray
-    rest: FloatArray
+    rest: FloatArray  # what the free run leaves of the output, shape (n,)
 
 
 def beginnings(problem: Problem, output: int) -> list[ResponsePrior]:

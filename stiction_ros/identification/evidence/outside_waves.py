@@ -38,17 +38,11 @@ EXPLAINED = 1e-6  # of the energy: less left than this is none left
 
 @dataclasses.dataclass(frozen=True)
 class OutsideWave:
-    """A wave in one output.
+    """A wave in one output."""
 
-    Attributes:
-        frequency: turns per sample.
-        harmonics: H.
-        gain: BIC without minus BIC with it, both without friction.
-    """
-
-    frequency: float
-    harmonics: int
-    gain: float
+    frequency: float  # turns per sample
+    harmonics: int  # H
+    gain: float  # BIC without minus BIC with it, both without friction
 
     @property
     def lines(self) -> tuple[float, ...]:
@@ -96,15 +90,11 @@ def _strongest(problem: Problem, output: int) -> OutsideWave | None:
 
 @dataclasses.dataclass(frozen=True)
 class _Beside:
-    """What explains an output without any wave, and what it leaves.
+    """What explains an output without any wave, and what it leaves."""
 
-    Attributes:
-        plain: orthonormal basis of a constant, the output's past and the valves', shape (n, q).
-        left: of the output, shape (n,).
-    """
-
+    # orthonormal basis of a constant, the output's past and the valves', shape (n, q)
     plain: FloatArray
-    left: FloatArray
+    left: FloatArray  # of the output, shape (n,)
 
     @classmethod
     def of(cls, problem: Problem, output: int) -> _Beside:

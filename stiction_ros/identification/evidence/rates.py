@@ -65,21 +65,14 @@ UNDIED = 0.1  # of the largest tap: a response whose last tap is larger goes on 
 
 @dataclasses.dataclass(frozen=True)
 class Look:
-    """What one rate shows.
+    """What one rate shows."""
 
-    Attributes:
-        problem: the record at this rate.
-        found: by the search.
-        accepted: per valve, frictions that are not rejected.
-        carries_news: whether at least every other row holds a report of its own.
-        wave_gain: −2 log likelihood that waves from outside add where there is no friction; None
-            where none is believed.
-    """
-
-    problem: Problem
-    found: Found
-    accepted: tuple[Accepted, ...]
-    carries_news: bool = True
+    problem: Problem  # the record at this rate
+    found: Found  # by the search
+    accepted: tuple[Accepted, ...]  # per valve, frictions that are not rejected
+    carries_news: bool = True  # whether at least every other row holds a report of its own
+    # −2 log likelihood that waves from outside add where there is no friction; None where none is
+    # believed
     wave_gain: float | None = None
 
     @property
@@ -135,18 +128,13 @@ class Look:
 
 @dataclasses.dataclass(frozen=True)
 class Agreement:
-    """What two neighbouring rates say of one valve.
+    """What two neighbouring rates say of one valve."""
 
-    Attributes:
-        look: the one of the two with more evidence.
-        gain: the lesser of what friction gains at both beyond what it must, −2 log of the marginal
-            likelihood.
-        alike: whether the bands that they accept overlap, but for :data:`ALIKE`, and both rates
-            have a say.
-    """
-
-    look: Look
+    look: Look  # the one of the two with more evidence
+    # the lesser of what friction gains at both beyond what it must, −2 log of the marginal
+    # likelihood
     gain: float
+    # whether the bands that they accept overlap, but for ``ALIKE``, and both rates have a say
     alike: bool
 
     @classmethod

@@ -54,19 +54,13 @@ SWEEPS = 3  # searches of a valve, at most
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """What a search met.
+    """What a search met."""
 
-    Attributes:
-        best: the candidate of least loss.
-        ideal: the best fit without any friction.
-        without: per valve, the best fit in which it has no friction and the others theirs.
-        met: every candidate, best first.
-    """
-
-    best: Candidate
-    ideal: Candidate
+    best: Candidate  # the candidate of least loss
+    ideal: Candidate  # the best fit without any friction
+    # per valve, the best fit in which it has no friction and the others theirs
     without: tuple[Candidate, ...]
-    met: tuple[Candidate, ...]
+    met: tuple[Candidate, ...]  # every candidate, best first
 
     def heads(self, *valves: int) -> list[Candidate]:
         """Return the best with friction of each of ``valves``, none for all, to try elsewhere."""

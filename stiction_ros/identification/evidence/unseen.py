@@ -27,15 +27,10 @@ LATE = 1.0  # samples by which a stem answers late, at most
 
 @dataclasses.dataclass(frozen=True)
 class Unseen:
-    """By how much one end may lie elsewhere than the samples show; unit of OP, 0 or more.
+    """By how much one end may lie elsewhere than the samples show; unit of OP, 0 or more."""
 
-    Attributes:
-        less: what OP moves before the stem answers.
-        more: by how much OP goes farther between samples.
-    """
-
-    less: float
-    more: float
+    less: float  # what OP moves before the stem answers
+    more: float  # by how much OP goes farther between samples
 
     @classmethod
     def of(cls, op: FloatArray) -> Unseen:

@@ -42,17 +42,11 @@ def energy_of(signal: FloatArray) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class Criterion:
-    """The loss of one output as a function of the stem of one valve, all else given.
+    """The loss of one output as a function of the stem of one valve, all else given."""
 
-    Attributes:
-        given: what stands beside the stem.
-        precision: inverse of K.
-        constant: what the loss adds to the kernel's.
-    """
-
-    given: Given
-    precision: FloatArray
-    constant: float
+    given: Given  # what stands beside the stem
+    precision: FloatArray  # inverse of K
+    constant: float  # what the loss adds to the kernel's
 
     def losses(self, stems: FloatArray, least_moves: int = 0) -> FloatArray:
         """Return the loss of each of many stems, scaled, shape (G, N).
@@ -65,33 +59,19 @@ class Criterion:
 
 @dataclasses.dataclass(frozen=True)
 class Whitened:
-    """One output and some stems, whitened: what no prior changes.
+    """One output and some stems, whitened: what no prior changes."""
 
-    Attributes:
-        noise: D.
-        seen: the output, shape (n,).
-        known: a constant and waves from outside: a wave stays one when it is whitened.
-        passed: what D makes of each harmonic, complex, shape (H,).
-        stems: scaled, shape (m, N).
-        lags: of the stems, with each other and with the output.
-        products: of ``known`` and of the lags of every stem with each other, shape (q, q).
-        seen_products: of these with the output, shape (q,).
-        edges: of the groups of taps.
-        reach: how far the response of one of the valves is expected to get, or None.
-        at: index in ``stems`` of the one whose response it is; −1 where that is not among them.
-    """
-
-    noise: FloatArray
-    seen: FloatArray
-    known: Lines
-    passed: ComplexArray
-    stems: FloatArray
-    lags: Products
-    products: FloatArray
-    seen_products: FloatArray
-    edges: IntArray
-    reach: Reach | None
-    at: int
+    noise: FloatArray  # D
+    seen: FloatArray  # the output, shape (n,)
+    known: Lines  # a constant and waves from outside: a wave stays one when it is whitened
+    passed: ComplexArray  # what D makes of each harmonic, complex, shape (H,)
+    stems: FloatArray  # scaled, shape (m, N)
+    lags: Products  # of the stems, with each other and with the output
+    products: FloatArray  # of ``known`` and of the lags of every stem with each other, shape (q, q)
+    seen_products: FloatArray  # of these with the output, shape (q,)
+    edges: IntArray  # of the groups of taps
+    reach: Reach | None  # how far the response of one of the valves is expected to get, or None
+    at: int  # index in ``stems`` of the one whose response it is; −1 where that is not among them
 
     @classmethod
     def of(

@@ -44,17 +44,11 @@ FITTED = 2
 
 @dataclasses.dataclass(frozen=True)
 class Branch:
-    """Cells of one window that share their first slip.
+    """Cells of one window that share their first slip."""
 
-    Attributes:
-        search: the criterion on this window.
-        begin: the first slip.
-        scan: the cells.
-    """
-
-    search: PatternSearch
-    begin: Beginning
-    scan: PatternScan
+    search: PatternSearch  # the criterion on this window
+    begin: Beginning  # the first slip
+    scan: PatternScan  # the cells
 
 
 def growing_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Model:

@@ -36,21 +36,13 @@ LEAST_GAIN = 0.3
 
 @dataclasses.dataclass(frozen=True)
 class PatternMap:
-    """The enumerated neighbourhood of a model.
+    """The enumerated neighbourhood of a model."""
 
-    Attributes:
-        begin: the first slip.
-        cells: all that were met.
-        scan: of these.
-        rectangle: (J low, J high, S low, S high) that was enumerated, %.
-        closed: whether every pattern at its edge is rejected.
-    """
-
-    begin: Beginning
-    cells: Cells
-    scan: PatternScan
-    rectangle: FloatArray
-    closed: bool
+    begin: Beginning  # the first slip
+    cells: Cells  # all that were met
+    scan: PatternScan  # of these
+    rectangle: FloatArray  # (J low, J high, S low, S high) that was enumerated, %
+    closed: bool  # whether every pattern at its edge is rejected
 
     @property
     def patterns(self) -> int:

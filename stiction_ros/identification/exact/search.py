@@ -70,18 +70,12 @@ class FirstScan:
 
     Until a valve first slips its stem is where it was left. When that takes long, the right
     friction is found only from the right beginning, so other beginnings are scanned as well.
-
-    Attributes:
-        model: the model whose other valves and noise the scans saw.
-        valve: index.
-        scans: by criterion.
-        elsewhere: one-step scans of stems that begin away from OP.
     """
 
-    model: Model
-    valve: int
-    scans: Mapping[Criterion, ValveScan]
-    elsewhere: tuple[ValveScan, ...]
+    model: Model  # the model whose other valves and noise the scans saw
+    valve: int  # index
+    scans: Mapping[Criterion, ValveScan]  # by criterion
+    elsewhere: tuple[ValveScan, ...]  # one-step scans of stems that begin away from OP
 
     @property
     def gain(self) -> float:
@@ -302,14 +296,10 @@ def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
 
 @dataclasses.dataclass(frozen=True)
 class SearchOutcome:
-    """Where a search ended.
+    """Where a search ended."""
 
-    Attributes:
-        model: the best model.
-        rivals: pairs (valve with friction, valve whose friction explains the record as well).
-    """
-
-    model: Model
+    model: Model  # the best model
+    # pairs (valve with friction, valve whose friction explains the record as well)
     rivals: tuple[tuple[int, int], ...] = ()
 
 

@@ -35,20 +35,13 @@ BOX = 0.12  # of the first box: half its width, as a share of a range
 
 @dataclasses.dataclass(frozen=True)
 class Range:
-    """Where one further parameter is searched.
+    """Where one further parameter is searched."""
 
-    Attributes:
-        key: its name in YAML.
-        low, high: ends.
-        first: value it begins at.
-        logarithmic: whether in proportion.
-    """
-
-    key: str
-    low: float
+    key: str  # its name in YAML
+    low: float  # low, high: ends
     high: float
-    first: float
-    logarithmic: bool
+    first: float  # value it begins at
+    logarithmic: bool  # whether in proportion
 
     @classmethod
     def of(cls, entry: Parameter, default: float | None) -> Range:
@@ -106,15 +99,10 @@ def searched(law: type[FrictionLaw]) -> tuple[str, ...]:
 
 @dataclasses.dataclass(frozen=True)
 class Settled:
-    """Every point that was judged, best first.
+    """Every point that was judged, best first."""
 
-    Attributes:
-        rows: (f_S, f_D, further …, start), %, shape (G, 3 + n).
-        loss: shape (G,).
-    """
-
-    rows: FloatArray
-    loss: FloatArray
+    rows: FloatArray  # (f_S, f_D, further …, start), %, shape (G, 3 + n)
+    loss: FloatArray  # shape (G,)
 
     def accepted(self, slack: float) -> FloatArray:
         """Return the rows that are worse than the best by no more than ``slack``."""

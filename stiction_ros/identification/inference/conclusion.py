@@ -21,19 +21,12 @@ from stiction_ros.records.record import Record
 
 @dataclasses.dataclass(frozen=True)
 class Findings:
-    """What the search leaves to be told.
+    """What the search leaves to be told."""
 
-    Attributes:
-        model: the final model.
-        valves: the estimates.
-        orders: all orders that were compared.
-        remarks: sentences for people on ambiguities and on what is exact.
-    """
-
-    model: Model
-    valves: tuple[ValveEstimate, ...]
-    orders: tuple[OrderRow, ...]
-    remarks: tuple[str, ...]
+    model: Model  # the final model
+    valves: tuple[ValveEstimate, ...]  # the estimates
+    orders: tuple[OrderRow, ...]  # all orders that were compared
+    remarks: tuple[str, ...]  # sentences for people on ambiguities and on what is exact
 
 
 def conclude(record: Record, data: Data, found: Findings, seconds: float) -> Identification:

@@ -36,30 +36,19 @@ Interval = tuple[float, float]
 
 @dataclasses.dataclass(frozen=True)
 class FrictionIntervals:
-    """Intervals of one valve.
+    """Intervals of one valve."""
 
-    Attributes:
-        static: f_S, union over all switching patterns that are not rejected, %.
-        dynamic: f_D, %.
-        static_estimate: middle of ``static`` if itself not rejected, otherwise the middle of
-            the best pattern, %.
-        dynamic_estimate: f_D of the best fit, %.
-        deadband_loss: how much worse the best f_D = f_S is, in units of −2 log likelihood.
-        patterns: number of switching patterns enumerated round the best one; 0 when the
-            valve does not slip.
-        closed: whether that enumeration reached rejected patterns on every side.
-        model: the model with the best pattern.
-        profile: rows (f_S, least loss above the best) over all patterns tried, %.
-    """
-
-    static: Interval
-    dynamic: Interval
+    static: Interval  # f_S, union over all switching patterns that are not rejected, %
+    dynamic: Interval  # f_D, %
+    # middle of ``static`` if itself not rejected, otherwise the middle of the best pattern, %
     static_estimate: float
-    dynamic_estimate: float
-    deadband_loss: float
+    dynamic_estimate: float  # f_D of the best fit, %
+    deadband_loss: float  # how much worse the best f_D = f_S is, in units of −2 log likelihood
+    # number of switching patterns enumerated round the best one; 0 when the valve does not slip
     patterns: int
-    closed: bool
-    model: Model
+    closed: bool  # whether that enumeration reached rejected patterns on every side
+    model: Model  # the model with the best pattern
+    # rows (f_S, least loss above the best) over all patterns tried, %
     profile: tuple[tuple[float, float], ...]
 
 

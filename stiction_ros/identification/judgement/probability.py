@@ -26,19 +26,12 @@ SURE = 0.95
 
 
 class Node(NamedTuple):
-    """One node of a tree.
+    """One node of a tree."""
 
-    Attributes:
-        value: mean log odds of the loops that come here.
-        figure: that is asked for; empty at a leaf.
-        at: loops with at most this go to ``low``, the others to ``high``.
-        low, high: places of the next nodes in the tree.
-    """
-
-    value: float
-    figure: str = ""
-    at: float = 0.0
-    low: int = 0
+    value: float  # mean log odds of the loops that come here
+    figure: str = ""  # that is asked for; empty at a leaf
+    at: float = 0.0  # loops with at most this go to ``low``, the others to ``high``
+    low: int = 0  # low, high: places of the next nodes in the tree
     high: int = 0
 
 

@@ -16,18 +16,13 @@ SAME = 1e-9
 
 
 class DelayRoom(NamedTuple):
-    """One problem at a time.
+    """One problem at a time."""
 
-    Attributes:
-        products: lagged products, row d those of lags that are d apart; as many as LANES delays
-            need, 0 beyond the last, shape (width, L').
-        right: products with the rest, shape (L',).
-        solving: for the systems, shape (width + 3, width, LANES).
-    """
-
+    # lagged products, row d those of lags that are d apart; as many as LANES delays need, 0 beyond
+    # the last, shape (width, L')
     products: FloatArray
-    right: FloatArray
-    solving: FloatArray
+    right: FloatArray  # products with the rest, shape (L',)
+    solving: FloatArray  # for the systems, shape (width + 3, width, LANES)
 
 
 @compiled

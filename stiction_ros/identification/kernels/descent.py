@@ -27,16 +27,11 @@ FIRST, LEAST, HARDEST = 1e-4, 1e-9, 1e6  # damping
 
 
 class Start(NamedTuple):
-    """Where a descent starts.
+    """Where a descent starts."""
 
-    Attributes:
-        a, noise: monic polynomials A and D.
-        energy: sum of squares of the innovations; 0 where it is not known.
-    """
-
-    a: FloatArray
+    a: FloatArray  # a, noise: monic polynomials A and D
     noise: FloatArray
-    energy: float
+    energy: float  # sum of squares of the innovations; 0 where it is not known
 
 
 @compiled

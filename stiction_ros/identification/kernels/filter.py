@@ -13,24 +13,17 @@ from stiction_ros.lanes import LANES, halves_swapped, put, row, spread
 
 
 class Window(NamedTuple):
-    """What of a scan is the same for all signals.
+    """What of a scan is the same for all signals."""
 
-    Attributes:
-        samples, first: N and the first sample of the criterion.
-        lag, lags: first lag and number of lags.
-        width: n_b, number of lags of one delay.
-        tails: what a step at each sample adds to the products with the projected columns, and
-            in the last column with the rest, at lag 0, shape (N + lag + lags, q + 1).
-        numerator, denominator: D and A of the prefilter.
-    """
-
-    samples: int
+    samples: int  # samples, first: N and the first sample of the criterion
     first: int
-    lag: int
+    lag: int  # lag, lags: first lag and number of lags
     lags: int
-    width: int
+    width: int  # n_b, number of lags of one delay
+    # what a step at each sample adds to the products with the projected columns, and in the last
+    # column with the rest, at lag 0, shape (N + lag + lags, q + 1)
     tails: FloatArray
-    numerator: FloatArray
+    numerator: FloatArray  # numerator, denominator: D and A of the prefilter
     denominator: FloatArray
 
 

@@ -44,17 +44,11 @@ def with_past(signal: FloatArray, taps: int) -> FloatArray:
 
 
 class Moves(NamedTuple):
-    """A stem as what it does: it stays, and moves now and then.
+    """A stem as what it does: it stays, and moves now and then."""
 
-    Attributes:
-        begin: its first value, and that before.
-        at: rows in which it moves, shape (c,).
-        by: how far, shape (c,).
-    """
-
-    begin: float
-    at: IntArray
-    by: FloatArray
+    begin: float  # its first value, and that before
+    at: IntArray  # rows in which it moves, shape (c,)
+    by: FloatArray  # how far, shape (c,)
 
 
 @compiled_fused
@@ -204,20 +198,14 @@ def own_products(signal: FloatArray, begun: FloatArray, edges: IntArray) -> Floa
 
 
 class Products(NamedTuple):
-    """What the groups of lags of some stems have in common with each other and with signals.
+    """What the groups of lags of some stems have in common with each other and with signals."""
 
-    Attributes:
-        past: the last M + n + 1 samples of each stem, those before the record included, whitened,
-            shape (m, M + n + 1).
-        first: :func:`step_products` with the first lag of each, shape (m, N + M + 8).
-        beside: products with the signals, shape (c, m r).
-        shared: with each other, shape (m r, m r).
-    """
-
+    # the last M + n + 1 samples of each stem, those before the record included, whitened, shape (m,
+    # M + n + 1)
     past: FloatArray
-    first: FloatArray
-    beside: FloatArray
-    shared: FloatArray
+    first: FloatArray  # ``step_products`` with the first lag of each, shape (m, N + M + 8)
+    beside: FloatArray  # products with the signals, shape (c, m r)
+    shared: FloatArray  # with each other, shape (m r, m r)
 
 
 @compiled_fused

@@ -29,76 +29,47 @@ THIN = 4
 
 
 class Problem(NamedTuple):
-    """One output, the signals that drive it and the window of its criterion.
+    """One output, the signals that drive it and the window of its criterion."""
 
-    Attributes:
-        y: output, shape (N,).
-        signals: the stems, an impulse and y, each after ``pad`` zeros, shape (m + 2, pad + N).
-        lags: first lag of each stem, shape (m,).
-        inputs: n_b, number of lags of each stem.
-        pad: zeros before the first sample.
-        begin, first: first sample of the free run and of the innovations.
-        energy: Σy² over the window.
-    """
-
-    y: FloatArray
+    y: FloatArray  # output, shape (N,)
+    # the stems, an impulse and y, each after ``pad`` zeros, shape (m + 2, pad + N)
     signals: FloatArray
-    lags: IntArray
-    inputs: int
-    pad: int
-    begin: int
+    lags: IntArray  # first lag of each stem, shape (m,)
+    inputs: int  # n_b, number of lags of each stem
+    pad: int  # zeros before the first sample
+    begin: int  # begin, first: first sample of the free run and of the innovations
     first: int
-    energy: float
+    energy: float  # Σy² over the window
 
 
 class Room(NamedTuple):
-    """Room for the rows of one evaluation at a time, n samples from ``begin`` on.
+    """Room for the rows of one evaluation at a time, n samples from ``begin`` on."""
 
-    Attributes:
-        driven: the signals through 1/A, shape (m + 2, pad + N).
-        plain: linear columns of the free run, as rows, shape (q, n).
-        rows: linear columns of innovations and priced w, as rows; then the target, which the
-            residual replaces; then the derivatives, shape (q + 1 + n_a + p, n').
-        slope: the free run through 1/A after zeros, shape (2, pad + n).
-        slopes: its differences, shape (n_a, n).
-        moved: a signal through D, shape (pad + N,).
-        tables: of the differences of n_b and of n_a lags: differences = table · lags.
-    """
-
-    driven: FloatArray
-    plain: FloatArray
+    driven: FloatArray  # the signals through 1/A, shape (m + 2, pad + N)
+    plain: FloatArray  # linear columns of the free run, as rows, shape (q, n)
+    # linear columns of innovations and priced w, as rows; then the target, which the residual
+    # replaces; then the derivatives, shape (q + 1 + n_a + p, n')
     rows: FloatArray
-    slope: FloatArray
-    slopes: FloatArray
-    moved: FloatArray
+    slope: FloatArray  # the free run through 1/A after zeros, shape (2, pad + n)
+    slopes: FloatArray  # its differences, shape (n_a, n)
+    moved: FloatArray  # a signal through D, shape (pad + N,)
+    # of the differences of n_b and of n_a lags: differences = table · lags
     tables: tuple[FloatArray, FloatArray]
 
 
 class Point(NamedTuple):
-    """The variable-projection solution at (A, D).
+    """The variable-projection solution at (A, D)."""
 
-    Attributes:
-        a, noise: monic polynomials A and D.
-        theta: coefficients of the differences of lags, shape (q,); 0 where left out.
-        root: Cholesky factor of the Gram matrix of the kept rows, in the upper left.
-        kept: which rows are kept, the first ``number``.
-        number: of kept rows.
-        free_run: simulated output from ``begin`` on.
-        energy: sum of squares of the innovations.
-        total: the same with priced w.
-        weight: price of Σw².
-    """
-
-    a: FloatArray
+    a: FloatArray  # a, noise: monic polynomials A and D
     noise: FloatArray
-    theta: FloatArray
-    root: FloatArray
-    kept: IntArray
-    number: int
-    free_run: FloatArray
-    energy: float
-    total: float
-    weight: float
+    theta: FloatArray  # coefficients of the differences of lags, shape (q,); 0 where left out
+    root: FloatArray  # Cholesky factor of the Gram matrix of the kept rows, in the upper left
+    kept: IntArray  # which rows are kept, the first ``number``
+    number: int  # of kept rows
+    free_run: FloatArray  # simulated output from ``begin`` on
+    energy: float  # sum of squares of the innovations
+    total: float  # the same with priced w
+    weight: float  # price of Σw²
 
 
 @compiled

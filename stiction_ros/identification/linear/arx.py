@@ -34,39 +34,26 @@ class EquationOrders:
 
 @dataclasses.dataclass(frozen=True)
 class EquationFit:
-    """One output's equation in deviations from the means of the record.
+    """One output's equation in deviations from the means of the record."""
 
-    Attributes:
-        name: tag of the output.
-        status: ``OK``; ``CONSTRAINED`` where A had to be kept stable.
-        reason: one sentence; empty when ok.
-        orders: n_a, n_b.
-        delays: t_d per valve, samples.
-        a: a_1 … a_na, shape (n_a,), sign as in (8a).
-        b: shape (m, n_b), engineering units per %.
-        constant: engineering units, for deviations from ``stem0`` and ``pv0``.
-        stem0, pv0: operating point, shape (m,) in % and a number in engineering units.
-        noise_std: standard deviation of the one-step error, engineering units.
-        count: samples of the criterion.
-        fit_one_step, fit_free_run: NRMSE fit, %; −inf for a free run that diverges.
-        aic, bic: of the free-run error, y in units of its standard deviation: where noise is added
-            to PV, the one-step error of ARX misleads.
-    """
-
-    name: str
-    status: LinearStatus
-    reason: str
-    orders: EquationOrders
-    delays: tuple[int, ...]
-    a: FloatArray
-    b: FloatArray
-    constant: float
+    name: str  # tag of the output
+    status: LinearStatus  # ``OK``; ``CONSTRAINED`` where A had to be kept stable
+    reason: str  # one sentence; empty when ok
+    orders: EquationOrders  # n_a, n_b
+    delays: tuple[int, ...]  # t_d per valve, samples
+    a: FloatArray  # a_1 … a_na, shape (n_a,), sign as in (8a)
+    b: FloatArray  # shape (m, n_b), engineering units per %
+    constant: float  # engineering units, for deviations from ``stem0`` and ``pv0``
+    # stem0, pv0: operating point, shape (m,) in % and a number in engineering units
     stem0: FloatArray
     pv0: float
-    noise_std: float
-    count: int
+    noise_std: float  # standard deviation of the one-step error, engineering units
+    count: int  # samples of the criterion
+    # fit_one_step, fit_free_run: NRMSE fit, %; −inf for a free run that diverges
     fit_one_step: float
     fit_free_run: float
+    # aic, bic: of the free-run error, y in units of its standard deviation: where noise is added to
+    # PV, the one-step error of ARX misleads
     aic: float
     bic: float
 

@@ -48,27 +48,17 @@ class OrderCriterion(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class LinearData:
-    """Inputs and outputs about their means, in units of their standard deviations.
+    """Inputs and outputs about their means, in units of their standard deviations."""
 
-    Attributes:
-        name: of the record.
-        valves, outputs: tags.
-        sample_time: seconds.
-        u: inputs, shape (m, N).
-        y: outputs, shape (p, N).
-        u_mean, u_scale: shape (m,), %.
-        y_mean, y_scale: shape (p,), engineering units.
-    """
-
-    name: str
-    valves: tuple[str, ...]
+    name: str  # of the record
+    valves: tuple[str, ...]  # valves, outputs: tags
     outputs: tuple[str, ...]
-    sample_time: float
-    u: FloatArray
-    y: FloatArray
-    u_mean: FloatArray
+    sample_time: float  # seconds
+    u: FloatArray  # inputs, shape (m, N)
+    y: FloatArray  # outputs, shape (p, N)
+    u_mean: FloatArray  # u_mean, u_scale: shape (m,), %
     u_scale: FloatArray
-    y_mean: FloatArray
+    y_mean: FloatArray  # y_mean, y_scale: shape (p,), engineering units
     y_scale: FloatArray
 
     @property

@@ -21,20 +21,14 @@ DELAY_MARGIN = 2.0
 class OrderOptions:
     """What :func:`choose_orders` may choose from.
 
-    Attributes:
-        output: n_a to try.
-        input: n_b to try; empty takes n_b = n_a.
-        delay: inclusive range of t_d, samples, for every valve.
-        criterion: AIC or BIC.
-
     Raises:
         InputError: no order, or a range that holds no delay.
     """
 
-    output: tuple[int, ...] = (1, 2, 3)
-    input: tuple[int, ...] = ()
-    delay: tuple[int, int] = (0, 10)
-    criterion: OrderCriterion = OrderCriterion.BIC
+    output: tuple[int, ...] = (1, 2, 3)  # n_a to try
+    input: tuple[int, ...] = ()  # n_b to try; empty takes n_b = n_a
+    delay: tuple[int, int] = (0, 10)  # inclusive range of t_d, samples, for every valve
+    criterion: OrderCriterion = OrderCriterion.BIC  # AIC or BIC
 
     def __post_init__(self) -> None:
         if not self.output:
@@ -56,17 +50,12 @@ class OrderOptions:
 
 @dataclasses.dataclass(frozen=True)
 class OrderChoice:
-    """The equation taken, and all that were tried.
+    """The equation taken, and all that were tried."""
 
-    Attributes:
-        fit: the equation taken.
-        rivals: every equation, by orders and delays, all scored on the same samples.
-        criterion: what chose.
-    """
-
-    fit: EquationFit
+    fit: EquationFit  # the equation taken
+    # every equation, by orders and delays, all scored on the same samples
     rivals: tuple[EquationFit, ...]
-    criterion: OrderCriterion
+    criterion: OrderCriterion  # what chose
 
     def best_of_each_order(self) -> list[EquationFit]:
         """Return for each (n_a, n_b) the rival with the delays that do best; the one taken."""

@@ -32,52 +32,33 @@ TIGHT = 1e6  # 1 / variance with which a reach is held, over that of the prior
 
 @dataclasses.dataclass(frozen=True)
 class Reach:
-    """How far a response gets is known but for a factor.
+    """How far a response gets is known but for a factor."""
 
-    Attributes:
-        valve: index of the one whose response it is.
-        heights: what sums its groups of taps up, shape (r,).
-        unit: the sum that is expected.
-    """
-
-    valve: int
-    heights: FloatArray
-    unit: float
+    valve: int  # index of the one whose response it is
+    heights: FloatArray  # what sums its groups of taps up, shape (r,)
+    unit: float  # the sum that is expected
 
 
 @dataclasses.dataclass(frozen=True)
 class Held:
-    """A response whose sum is held, as one more row of the equations for it.
+    """A response whose sum is held, as one more row of the equations for it."""
 
-    Attributes:
-        precision: that it adds, shape (r, r).
-        pull: that it adds to the products with the output, shape (r,).
-        energy: that it adds to the output's.
-        determinant: that it adds to −2 log likelihood.
-    """
-
-    precision: FloatArray
-    pull: FloatArray
-    energy: float
-    determinant: float
+    precision: FloatArray  # that it adds, shape (r, r)
+    pull: FloatArray  # that it adds to the products with the output, shape (r,)
+    energy: float  # that it adds to the output's
+    determinant: float  # that it adds to −2 log likelihood
 
 
 @dataclasses.dataclass(frozen=True)
 class ResponsePrior:
-    """One member of the family.
+    """One member of the family."""
 
-    Attributes:
-        decay: index of λ in :data:`DECAYS`.
-        size: index of c in :data:`SIZES`.
-        wave, sharpness: indices in :data:`WAVES` and :data:`SHARPNESSES`; they count where there
-            is a wave.
-        reach: index in :data:`REACHES`, or :data:`FREE`; it counts where one is expected.
-    """
-
-    decay: int = 3
-    size: int = 2
+    decay: int = 3  # index of λ in ``DECAYS``
+    size: int = 2  # index of c in ``SIZES``
+    # wave, sharpness: indices in ``WAVES`` and ``SHARPNESSES``; they count where there is a wave
     wave: int = 5
     sharpness: int = 1
+    # index in ``REACHES``, or ``FREE``; it counts where one is expected
     reach: int = len(REACHES) // 2
 
     def variances(self, edges: IntArray) -> FloatArray:

@@ -51,21 +51,18 @@ UNSTABLE_MARGIN = 20.0
 class SubspaceOptions:
     """Options of :func:`fit_state_space`.
 
-    Attributes:
-        order: n; None takes the lowest criterion of the one-step error among stable models.
-        method: weighting; ``PREDICTOR`` for records of a closed loop.
-        delay: samples by which every input is late before the states see it, one per valve;
-            None is none. Delays that are left out cost one state each.
-        criterion: AIC or BIC, where the order is not given.
-
     Raises:
         InputError: an order or delay out of range.
     """
 
+    # n; None takes the lowest criterion of the one-step error among stable models
     order: int | None = None
+    # weighting; ``PREDICTOR`` for records of a closed loop
     method: SubspaceMethod = SubspaceMethod.CVA
+    # samples by which every input is late before the states see it, one per valve; None is none.
+    # Delays that are left out cost one state each
     delay: tuple[int, ...] | None = None
-    criterion: OrderCriterion = OrderCriterion.BIC
+    criterion: OrderCriterion = OrderCriterion.BIC  # AIC or BIC, where the order is not given
 
     def __post_init__(self) -> None:
         if self.order is not None and not 1 <= self.order <= 100:
@@ -76,22 +73,16 @@ class SubspaceOptions:
 
 @dataclasses.dataclass(frozen=True)
 class OrderRival:
-    """One order that was tried.
+    """One order that was tried."""
 
-    Attributes:
-        order: n.
-        aic, bic: of the one-step error, N log det(covariance) + 2k or k log N with
-            k = n (m + 2p) + p; the outputs in units of their standard deviations.
-        fit_one_step, fit_free_run: mean over the outputs, %.
-        radius: largest |λ| of A.
-    """
-
-    order: int
+    order: int  # n
+    # aic, bic: of the one-step error, N log det(covariance) + 2k or k log N with k = n (m + 2p) +
+    # p; the outputs in units of their standard deviations
     aic: float
     bic: float
-    fit_one_step: float
+    fit_one_step: float  # fit_one_step, fit_free_run: mean over the outputs, %
     fit_free_run: float
-    radius: float
+    radius: float  # largest |λ| of A
 
     def value(self, criterion: OrderCriterion) -> float:
         """Return the criterion's value."""
@@ -100,41 +91,29 @@ class OrderRival:
 
 @dataclasses.dataclass(frozen=True)
 class StateSpaceFit:
-    """A state-space model in engineering units; arrays read-only.
+    """A state-space model in engineering units; arrays read-only."""
 
-    Attributes:
-        status: ``OK``; ``CONSTRAINED`` where an unstable order does clearly better one step
-            ahead; ``UNSTABLE`` where |λ| ≥ 1; ``NO_MODEL`` where the states vanish.
-        reason: one sentence; empty when ok.
-        a, b, c, k: A (n, n), B (n, m) per %, C (p, n) and K (n, p), in engineering units.
-        x0: state at the first sample after the delays, shape (n,).
-        stem0, pv0: operating point χ_0 (m,), % and y_0 (p,): the offset of the model.
-        delay: samples, per valve, beside the one that B brings.
-        order: n.
-        singular_values: of the weighted projection, falling.
-        noise_std: standard deviation of the one-step error per output, shape (p,).
-        fit_one_step, fit_free_run: NRMSE fit per output, %, shape (p,).
-        rivals: the orders tried, with both fits.
-        method: the projection used.
-    """
-
+    # ``OK``; ``CONSTRAINED`` where an unstable order does clearly better one step ahead;
+    # ``UNSTABLE`` where |λ| ≥ 1; ``NO_MODEL`` where the states vanish
     status: LinearStatus
-    reason: str
+    reason: str  # one sentence; empty when ok
+    # a, b, c, k: A (n, n), B (n, m) per %, C (p, n) and K (n, p), in engineering units
     a: FloatArray
     b: FloatArray
     c: FloatArray
     k: FloatArray
-    x0: FloatArray
+    x0: FloatArray  # state at the first sample after the delays, shape (n,)
+    # stem0, pv0: operating point χ_0 (m,), % and y_0 (p,): the offset of the model
     stem0: FloatArray
     pv0: FloatArray
-    delay: tuple[int, ...]
-    order: int
-    singular_values: FloatArray
-    noise_std: FloatArray
-    fit_one_step: FloatArray
+    delay: tuple[int, ...]  # samples, per valve, beside the one that B brings
+    order: int  # n
+    singular_values: FloatArray  # of the weighted projection, falling
+    noise_std: FloatArray  # standard deviation of the one-step error per output, shape (p,)
+    fit_one_step: FloatArray  # fit_one_step, fit_free_run: NRMSE fit per output, %, shape (p,)
     fit_free_run: FloatArray
-    rivals: tuple[OrderRival, ...]
-    method: SubspaceMethod
+    rivals: tuple[OrderRival, ...]  # the orders tried, with both fits
+    method: SubspaceMethod  # the projection used
 
     @property
     def poles(self) -> NDArray[np.complex128]:

@@ -99,18 +99,12 @@ class SwapRule(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Evidence:
-    """Clear evidence that OP and PV are swapped.
+    """Clear evidence that OP and PV are swapped."""
 
-    Attributes:
-        rule: the sign.
-        reason: one sentence for people.
-        ratio: distance of the column OP from SP over that of the column PV, of the output
-            where it is largest; or the sum of the coefficients on the side of PV over that
-            on the side of OP.
-    """
-
-    rule: SwapRule
-    reason: str
+    rule: SwapRule  # the sign
+    reason: str  # one sentence for people
+    # distance of the column OP from SP over that of the column PV, of the output where it is
+    # largest; or the sum of the coefficients on the side of PV over that on the side of OP
     ratio: float
 
 

@@ -44,25 +44,16 @@ class Criterion(enum.Enum):
 
 @dataclasses.dataclass(frozen=True)
 class Data:
-    """One record prepared for the search.
+    """One record prepared for the search."""
 
-    Attributes:
-        y: outputs about their mean in units of their standard deviation, shape (p, N).
-        u: OP about its mean, %, shape (m, N).
-        law: friction law.
-        limit: largest f_S per valve, %, shape (m,).
-        delay: inclusive range of t_d.
-        min_moves: fewest stem moves of an accepted candidate.
-        further: per valve, values at which the law's parameters behind f_S and f_D are held;
-            empty for a law that has no others.
-    """
-
-    y: FloatArray
-    u: FloatArray
-    law: type[FrictionLaw]
-    limit: FloatArray
-    delay: tuple[int, int]
-    min_moves: int
+    y: FloatArray  # outputs about their mean in units of their standard deviation, shape (p, N)
+    u: FloatArray  # OP about its mean, %, shape (m, N)
+    law: type[FrictionLaw]  # friction law
+    limit: FloatArray  # largest f_S per valve, %, shape (m,)
+    delay: tuple[int, int]  # inclusive range of t_d
+    min_moves: int  # fewest stem moves of an accepted candidate
+    # per valve, values at which the law's parameters behind f_S and f_D are held; empty for a law
+    # that has no others
     further: tuple[tuple[float, ...], ...] = ()
 
     def part(self, begin: int, end: int) -> Data:
@@ -82,21 +73,13 @@ class Data:
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """Friction, stems, delays and fits of the whole record.
+    """Friction, stems, delays and fits of the whole record."""
 
-    Attributes:
-        friction: (f_S, f_D) per valve, shape (m, 2), %.
-        start: stem before the first sample minus first OP, %, shape (m,).
-        stems: shape (m, N), about the mean of the OP.
-        delays: one tuple of m delays per output.
-        fits: one fit per output.
-    """
-
-    friction: FloatArray
-    start: FloatArray
-    stems: FloatArray
-    delays: tuple[tuple[int, ...], ...]
-    fits: tuple[OutputFit, ...]
+    friction: FloatArray  # (f_S, f_D) per valve, shape (m, 2), %
+    start: FloatArray  # stem before the first sample minus first OP, %, shape (m,)
+    stems: FloatArray  # shape (m, N), about the mean of the OP
+    delays: tuple[tuple[int, ...], ...]  # one tuple of m delays per output
+    fits: tuple[OutputFit, ...]  # one fit per output
 
     def beginning(self, count: int) -> Model:
         """Return the model with the first ``count`` samples of its stems."""
@@ -115,21 +98,13 @@ class Model:
 
 @dataclasses.dataclass(frozen=True)
 class ValveScan:
-    """Result of one scan.
+    """Result of one scan."""
 
-    Attributes:
-        grid: rows (f_S, f_D), shape (G, 2).
-        starts: stem before the first sample minus first OP, %, shape (G,).
-        loss: best over the delays, summed over outputs, shape (G,).
-        delays: the best delay per output, shape (G, p).
-        moves: shape (G,).
-    """
-
-    grid: FloatArray
-    starts: FloatArray
-    loss: FloatArray
-    delays: FloatArray
-    moves: FloatArray
+    grid: FloatArray  # rows (f_S, f_D), shape (G, 2)
+    starts: FloatArray  # stem before the first sample minus first OP, %, shape (G,)
+    loss: FloatArray  # best over the delays, summed over outputs, shape (G,)
+    delays: FloatArray  # the best delay per output, shape (G, p)
+    moves: FloatArray  # shape (G,)
 
     def part(self, begin: int, end: int) -> ValveScan:
         """Return the rows from ``begin`` to before ``end``."""

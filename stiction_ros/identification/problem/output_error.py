@@ -38,50 +38,29 @@ FINE = (1e-3, 1e-4)
 
 @dataclasses.dataclass(frozen=True)
 class Orders:
-    """Orders and the common window of one identification.
+    """Orders and the common window of one identification."""
 
-    Attributes:
-        output: n_a.
-        input: n_b.
-        noise: p, order of D.
-        first: first sample k_0 of the criterion, the same for all rivals.
-    """
-
-    output: int
-    input: int
-    noise: int
-    first: int
+    output: int  # n_a
+    input: int  # n_b
+    noise: int  # p, order of D
+    first: int  # first sample k_0 of the criterion, the same for all rivals
 
 
 @dataclasses.dataclass(frozen=True)
 class OutputFit:
-    """A fitted output.
+    """A fitted output."""
 
-    Attributes:
-        orders: n_a, n_b, p, k_0.
-        delays: t_d per valve, samples.
-        a: monic polynomial A, shape (n_a + 1,).
-        b: shape (m, n_b).
-        constant: c.
-        noise: monic polynomial D, shape (p + 1,).
-        loss: the criterion, n log(Σε²/n) + n κ Σw²/Σy².
-        energy: sum of squared innovations.
-        count: n, number of innovations.
-        free_run: simulated output from sample k_0 − p on.
-        innovations: from sample k_0 on, shape (n,).
-    """
-
-    orders: Orders
-    delays: tuple[int, ...]
-    a: FloatArray
-    b: FloatArray
-    constant: float
-    noise: FloatArray
-    loss: float
-    energy: float
-    count: int
-    free_run: FloatArray
-    innovations: FloatArray
+    orders: Orders  # n_a, n_b, p, k_0
+    delays: tuple[int, ...]  # t_d per valve, samples
+    a: FloatArray  # monic polynomial A, shape (n_a + 1,)
+    b: FloatArray  # shape (m, n_b)
+    constant: float  # c
+    noise: FloatArray  # monic polynomial D, shape (p + 1,)
+    loss: float  # the criterion, n log(Σε²/n) + n κ Σw²/Σy²
+    energy: float  # sum of squared innovations
+    count: int  # n, number of innovations
+    free_run: FloatArray  # simulated output from sample k_0 − p on
+    innovations: FloatArray  # from sample k_0 on, shape (n,)
 
     @property
     def parameters(self) -> int:

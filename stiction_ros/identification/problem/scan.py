@@ -108,16 +108,12 @@ class OutputScan:
 
 @dataclasses.dataclass(frozen=True)
 class PatternEnergy:
-    """What SE of switching patterns is computed from; the stem is affine in f_D.
+    """What SE of switching patterns is computed from; the stem is affine in f_D."""
 
-    Attributes:
-        products: of what the columns leave of base with base, base with sign and sign with
-            sign, shape (G, 3, n_b, L).
-        rights: of base and sign with the rest, shape (G, 2, L).
-    """
-
+    # of what the columns leave of base with base, base with sign and sign with sign, shape (G, 3,
+    # n_b, L)
     products: FloatArray
-    rights: FloatArray
+    rights: FloatArray  # of base and sign with the rest, shape (G, 2, L)
 
     @property
     def delays(self) -> int:

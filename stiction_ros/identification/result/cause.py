@@ -25,22 +25,13 @@ class CauseKind(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Cause:
-    """Why one output oscillates.
+    """Why one output oscillates."""
 
-    Attributes:
-        kind: see :class:`CauseKind`.
-        period: of PV − SP, s; None where nothing stands out.
-        regularity: above 1 is regular, see
-            :mod:`stiction_ros.signals.oscillation`.
-        amplitude: √2 × RMS of the line at this period, engineering units.
-        sentence: for people.
-    """
-
-    kind: CauseKind
-    period: float | None
-    regularity: float
-    amplitude: float
-    sentence: str
+    kind: CauseKind  # see ``CauseKind``
+    period: float | None  # of PV − SP, s; None where nothing stands out
+    regularity: float  # above 1 is regular, see ``stiction_ros.signals.oscillation``
+    amplitude: float  # √2 × RMS of the line at this period, engineering units
+    sentence: str  # for people
 
     def to_dict(self) -> dict[str, str | float | None]:
         """Return the mapping of ``identify --json``."""

@@ -30,58 +30,41 @@ class FitStatus(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class ValveEstimate:
-    """Friction of one valve and the verdict on it.
+    """Friction of one valve and the verdict on it."""
 
-    Attributes:
-        name: tag of the valve.
-        verdict: sticky, backlash, healthy or undecided.
-        law: friction law that the figures belong to.
-        static_friction: f_S, %, the middle of its interval.
-        static_interval: values of f_S whose switching pattern the record does not reject, %.
-        dynamic_friction: f_D, %, the best fit.
-        dynamic_interval: values of f_D that the record does not reject, %.
-        jump: the smallest move of the stem, %, as the jump form of the law tells it; J = f_S − f_D
-            for a law that has none; 0 where the record does not distinguish the friction from a
-            pure deadband (J = 0).
-        stem_start: stem position before the first sample, %.
-        moves: number of samples at which the estimated stem moved.
-        evidence: named figures behind the verdict, see
-            :mod:`stiction_ros.identification.inference.verdict`.
-        profile: rows (f_S, least −2 log likelihood above the best) over the patterns that were
-            tried, f_S in %.
-        band_share: f_S + f_D over the width of OP's movement about its slow mean.
-        stability: how the answer holds at other rates and in halves; None where a method does
-            not look.
-        experiment: what would decide, with figures; empty where it is decided.
-        further: the law's parameters behind the first two, by their keys in YAML; empty where
-            it has no others or the valve no friction.
-        further_intervals: values of each that the record does not reject.
-        responds: whether PV answers this valve at all, as far as the record shows.
-        band_interval: values of f_S + f_D that the record does not reject, %; None where a method
-            does not look at the sum: see :attr:`sum_interval`.
-    """
-
-    name: str
-    verdict: VerdictKind
-    law: str
-    static_friction: float
+    name: str  # tag of the valve
+    verdict: VerdictKind  # sticky, backlash, healthy or undecided
+    law: str  # friction law that the figures belong to
+    static_friction: float  # f_S, %, the middle of its interval
+    # values of f_S whose switching pattern the record does not reject, %
     static_interval: tuple[float, float]
-    dynamic_friction: float
-    dynamic_interval: tuple[float, float]
+    dynamic_friction: float  # f_D, %, the best fit
+    dynamic_interval: tuple[float, float]  # values of f_D that the record does not reject, %
+    # the smallest move of the stem, %, as the jump form of the law tells it; J = f_S − f_D for a
+    # law that has none; 0 where the record does not distinguish the friction from a pure deadband
+    # (J = 0)
     jump: float
-    stem_start: float
-    moves: int
+    stem_start: float  # stem position before the first sample, %
+    moves: int  # number of samples at which the estimated stem moved
+    # named figures behind the verdict, see ``stiction_ros.identification.inference.verdict``
     evidence: Mapping[str, float]
+    # rows (f_S, least −2 log likelihood above the best) over the patterns that were tried, f_S in %
     profile: tuple[tuple[float, float], ...] = ()
-    band_share: float = 0.0
+    band_share: float = 0.0  # f_S + f_D over the width of OP's movement about its slow mean
+    # how the answer holds at other rates and in halves; None where a method does not look
     stability: Stability | None = None
-    experiment: str = ""
+    experiment: str = ""  # what would decide, with figures; empty where it is decided
+    # the law's parameters behind the first two, by their keys in YAML; empty where it has no others
+    # or the valve no friction
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    # values of each that the record does not reject
     further_intervals: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+    # values of f_S + f_D that the record does not reject, %; None where a method does not look at
+    # the sum: see ``sum_interval``
     band_interval: tuple[float, float] | None = None
     probability: float | None = None
     figures: Figures | None = None
-    responds: bool = True
+    responds: bool = True  # whether PV answers this valve at all, as far as the record shows
 
     def __repr__(self) -> str:
         frictions = f"f_S {self.static_friction:.3g} %, f_D {self.dynamic_friction:.3g} %"
@@ -169,28 +152,17 @@ class OutputModel:
     .. math:: y_k = -\sum_i a_i y_{k-i} + \sum_j \sum_i b_{j,i} \chi^{(j)}_{k-i-t_{d,j}} + bias
 
     driven by the stems in free run; what remains is autoregressive noise.
-
-    Attributes:
-        name: tag of the output.
-        a: a_1 … a_na, sign as in (8a).
-        b: per valve b_1 … b_nb, engineering units per %.
-        delay: per valve t_d, samples.
-        bias: constant of the equation, engineering units.
-        noise_std: standard deviation of the innovations, engineering units.
-        fit_one_step: NRMSE fit of the one-step prediction with the noise model, %.
-        fit_free_run: NRMSE fit of the free run, 100 (1 − ‖y − ŷ‖ / ‖y − mean y‖), %.
-        cause: of its oscillation; None where the loop was not closed again.
     """
 
-    name: str
-    a: tuple[float, ...]
-    b: Mapping[str, tuple[float, ...]]
-    delay: Mapping[str, int]
-    bias: float
-    noise_std: float
-    fit_one_step: float
-    fit_free_run: float
-    cause: Cause | None = None
+    name: str  # tag of the output
+    a: tuple[float, ...]  # a_1 … a_na, sign as in (8a)
+    b: Mapping[str, tuple[float, ...]]  # per valve b_1 … b_nb, engineering units per %
+    delay: Mapping[str, int]  # per valve t_d, samples
+    bias: float  # constant of the equation, engineering units
+    noise_std: float  # standard deviation of the innovations, engineering units
+    fit_one_step: float  # NRMSE fit of the one-step prediction with the noise model, %
+    fit_free_run: float  # NRMSE fit of the free run, 100 (1 − ‖y − ŷ‖ / ‖y − mean y‖), %
+    cause: Cause | None = None  # of its oscillation; None where the loop was not closed again
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""
@@ -209,16 +181,12 @@ class OutputModel:
 
 @dataclasses.dataclass(frozen=True)
 class OrderRow:
-    """One choice of orders, friction as the search found it.
+    """One choice of orders, friction as the search found it."""
 
-    Attributes:
-        output_order, input_order: n_a and n_b.
-        aic, bic: information criteria of the linear parts under the noise model; only
-            differences count.
-    """
-
-    output_order: int
+    output_order: int  # output_order, input_order: n_a and n_b
     input_order: int
+    # aic, bic: information criteria of the linear parts under the noise model; only differences
+    # count
     aic: float
     bic: float
 

@@ -10,18 +10,12 @@ Interval = tuple[float, float]
 
 @dataclasses.dataclass(frozen=True)
 class Look:
-    """One way of looking at a record.
+    """One way of looking at a record."""
 
-    Attributes:
-        name: for people, such as ``rows of 4 s`` or ``first half``.
-        gain: −2 log likelihood that friction adds there.
-        agrees: whether this look alone speaks for what is told of the valve.
-        band: f_S + f_D that it does not reject, %; None where it takes the friction of the whole.
-    """
-
-    name: str
-    gain: float
-    agrees: bool
+    name: str  # for people, such as ``rows of 4 s`` or ``first half``
+    gain: float  # −2 log likelihood that friction adds there
+    agrees: bool  # whether this look alone speaks for what is told of the valve
+    # f_S + f_D that it does not reject, %; None where it takes the friction of the whole
     band: Interval | None = None
 
     def to_dict(self) -> dict[str, Any]:
@@ -36,12 +30,9 @@ class Stability:
 
     A valve that is told to be healthy is agreed on by looks that see no friction; whatever else
     is told, by looks that see the friction that stands beside it.
-
-    Attributes:
-        tried: at least one.
     """
 
-    tried: tuple[Look, ...]
+    tried: tuple[Look, ...]  # at least one
 
     @property
     def agreed(self) -> tuple[str, ...]:

@@ -33,17 +33,11 @@ from stiction_ros.identification.switching.step_signals import StepSignals
 
 @dataclasses.dataclass(frozen=True)
 class Beginning:
-    """The stem before and at its first slip.
+    """The stem before and at its first slip."""
 
-    Attributes:
-        level: stem position before the first slip, %.
-        first: sample of the first slip; the length of the record when there is none.
-        direction: +1 or −1, of the first slip; 0 when there is none.
-    """
-
-    level: float
-    first: int
-    direction: float
+    level: float  # stem position before the first slip, %
+    first: int  # sample of the first slip; the length of the record when there is none
+    direction: float  # +1 or −1, of the first slip; 0 when there is none
 
     def slips_alike(self, other: Beginning) -> bool:
         """Return whether another beginning has the same first slip, from whatever level."""
@@ -52,15 +46,10 @@ class Beginning:
 
 @dataclasses.dataclass(frozen=True)
 class Cells:
-    """Cells of the (J, S) plane and their stems base − f_D · sign.
+    """Cells of the (J, S) plane and their stems base − f_D · sign."""
 
-    Attributes:
-        bounds: rows (J low, J high, S low, S high), %, shape (G, 4).
-        steps: base and sign as two channels.
-    """
-
-    bounds: FloatArray
-    steps: StepSignals
+    bounds: FloatArray  # rows (J low, J high, S low, S high), %, shape (G, 4)
+    steps: StepSignals  # base and sign as two channels
 
     @staticmethod
     def joined(parts: list[Cells]) -> Cells:

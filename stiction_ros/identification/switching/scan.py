@@ -12,25 +12,15 @@ from stiction_ros.effects.behaviour import FloatArray, IntArray
 
 @dataclasses.dataclass(frozen=True)
 class PatternScan:
-    """Evaluated cells.
+    """Evaluated cells."""
 
-    Attributes:
-        bounds: rows (J low, J high, S low, S high), %, shape (G, 4).
-        dynamic: range of f_D in the cell, shape (G, 2).
-        level: best f_D in the cell, shape (G,).
-        curvature: second derivative of the loss in f_D, shape (G,).
-        loss: n log(SE / n) at the best f_D and delays, summed over outputs, shape (G,).
-        delays: best delay per output, shape (G, p).
-        moves: number of stem moves, shape (G,).
-    """
-
-    bounds: FloatArray
-    dynamic: FloatArray
-    level: FloatArray
-    curvature: FloatArray
-    loss: FloatArray
-    delays: FloatArray
-    moves: FloatArray
+    bounds: FloatArray  # rows (J low, J high, S low, S high), %, shape (G, 4)
+    dynamic: FloatArray  # range of f_D in the cell, shape (G, 2)
+    level: FloatArray  # best f_D in the cell, shape (G,)
+    curvature: FloatArray  # second derivative of the loss in f_D, shape (G,)
+    loss: FloatArray  # n log(SE / n) at the best f_D and delays, summed over outputs, shape (G,)
+    delays: FloatArray  # best delay per output, shape (G, p)
+    moves: FloatArray  # number of stem moves, shape (G,)
 
     @staticmethod
     def joined(parts: list[PatternScan]) -> PatternScan:

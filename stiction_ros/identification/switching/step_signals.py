@@ -19,19 +19,14 @@ from stiction_ros.identification.kernels.step import dense_steps, he_steps
 
 @dataclasses.dataclass(frozen=True)
 class StepSignals:
-    """G signals of c channels each.
+    """G signals of c channels each."""
 
-    Attributes:
-        count: N, samples of every signal.
-        offsets: rows ``offsets[g]`` to ``offsets[g + 1]`` belong to signal g, shape (G + 1,).
-        places: samples from which on a row holds; 0 in the first of every signal, shape (R,).
-        values: shape (R, c).
-    """
-
-    count: int
+    count: int  # N, samples of every signal
+    # rows ``offsets[g]`` to ``offsets[g + 1]`` belong to signal g, shape (G + 1,)
     offsets: IntArray
+    # samples from which on a row holds; 0 in the first of every signal, shape (R,)
     places: IntArray
-    values: FloatArray
+    values: FloatArray  # shape (R, c)
 
     @classmethod
     def of(cls, *channels: FloatArray) -> StepSignals:

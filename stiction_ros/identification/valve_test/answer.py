@@ -17,15 +17,10 @@ from stiction_ros.records.record import Record
 
 @dataclasses.dataclass(frozen=True)
 class Answer:
-    """A verdict with the next round.
+    """A verdict with the next round."""
 
-    Attributes:
-        judgement: of the test so far.
-        plan: the next round; None where it is decided or the limits leave none.
-    """
-
-    judgement: Judgement
-    plan: Plan | None
+    judgement: Judgement  # of the test so far
+    plan: Plan | None  # the next round; None where it is decided or the limits leave none
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``valve-test judge --json``."""

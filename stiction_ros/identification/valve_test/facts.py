@@ -24,15 +24,10 @@ LAGS = 1.8
 
 @dataclasses.dataclass(frozen=True)
 class Limits:
-    """How far a test may go from where it begins; None where that is not said.
+    """How far a test may go from where it begins; None where that is not said."""
 
-    Attributes:
-        op: %.
-        pv: engineering units.
-    """
-
-    op: float | None = None
-    pv: float | None = None
+    op: float | None = None  # %
+    pv: float | None = None  # engineering units
 
     def of(self, facts: Facts) -> Facts:
         """Return facts with these limits in place of theirs."""

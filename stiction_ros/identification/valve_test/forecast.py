@@ -22,26 +22,17 @@ from stiction_ros.identification.valve_test.steps import Steps
 
 @dataclasses.dataclass(frozen=True)
 class Forecast:
-    """PV a dead time after the ends of further holds, where it has gone farthest.
+    """PV a dead time after the ends of further holds, where it has gone farthest."""
 
-    Attributes:
-        pv: of an ideal valve and under each friction, shape (1 + G, J).
-        alike: the same from now on, by one process for all, which tells stems apart.
-        weights: how likely each is, shape (1 + G,).
-        counts: the same of each friction of interest, 0 of others, shape (G,).
-        spread: standard deviation of what is left open of each: where PV is, how the load walks,
-            how the gain changes with the opening, shape (J,).
-        noise: the same of the mean of PV over each hold, shape (J,).
-        known: precision of the gain, over its square, by the test so far.
-    """
-
-    pv: FloatArray
-    alike: FloatArray
-    weights: FloatArray
-    counts: FloatArray
+    pv: FloatArray  # of an ideal valve and under each friction, shape (1 + G, J)
+    alike: FloatArray  # the same from now on, by one process for all, which tells stems apart
+    weights: FloatArray  # how likely each is, shape (1 + G,)
+    counts: FloatArray  # the same of each friction of interest, 0 of others, shape (G,)
+    # standard deviation of what is left open of each: where PV is, how the load walks, how the gain
+    # changes with the opening, shape (J,)
     spread: FloatArray
-    noise: FloatArray
-    known: float
+    noise: FloatArray  # the same of the mean of PV over each hold, shape (J,)
+    known: float  # precision of the gain, over its square, by the test so far
 
     @classmethod
     def of(cls, judgement: Judgement, levels: Sequence[float]) -> Forecast:

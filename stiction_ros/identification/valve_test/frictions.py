@@ -33,24 +33,15 @@ class Frictions:
     Their prior is even over log f_S, over f_D / f_S and over the place χ_0 of the stem in its band,
     half of it at f_D = f_S, where a slip makes no jump. f_D may be negative: behind a positioner a
     slip goes on beyond OP.
-
-    Attributes:
-        middles: log f_S, f_D / f_S and (χ_0 − OP) / f_S of each, shape (G, 3).
-        widths: of each, shape (G, 3).
-        lags: whether the stem follows OP behind an actuator's lag, shape (G,).
-        logs: log of the prior of each, shape (G,).
-        moves: of the stem at each step of OP, %, that differ, shape (U, M).
-        which: row of ``moves`` of each cell, shape (G,).
-        ends: lead of OP over the stem at the end, %, shape (G,).
     """
 
-    middles: FloatArray
-    widths: FloatArray
-    lags: BoolArray
-    logs: FloatArray
-    moves: FloatArray
-    which: IntArray
-    ends: FloatArray
+    middles: FloatArray  # log f_S, f_D / f_S and (χ_0 − OP) / f_S of each, shape (G, 3)
+    widths: FloatArray  # of each, shape (G, 3)
+    lags: BoolArray  # whether the stem follows OP behind an actuator's lag, shape (G,)
+    logs: FloatArray  # log of the prior of each, shape (G,)
+    moves: FloatArray  # of the stem at each step of OP, %, that differ, shape (U, M)
+    which: IntArray  # row of ``moves`` of each cell, shape (G,)
+    ends: FloatArray  # lead of OP over the stem at the end, %, shape (G,)
 
     @classmethod
     def all(cls, steps: Steps) -> Frictions:

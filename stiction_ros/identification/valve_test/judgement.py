@@ -29,32 +29,21 @@ INTERVAL = (0.025, 0.975)
 
 @dataclasses.dataclass(frozen=True)
 class Judgement:
-    """What a test says of the valve so far.
+    """What a test says of the valve so far."""
 
-    Attributes:
-        verdict: sticky, backlash, healthy or undecided.
-        probability: of friction of interest: of :data:`SMALLEST` or more, and such that a slip of
-            f_S moves PV by more than its noise, which hides the cycles of less.
-        f_s, f_d: median, %; 0 for a valve without friction.
-        f_s_interval, f_d_interval: 95 % of what is possible, %.
-        responded: whether PV surely answered OP at all.
-        moves_seen: steps of OP in the record.
-        weights: how likely each friction is, shape (G,).
-        counts: whether it is of interest, shape (G,).
-        trial, ideal, sticky, frictions: what it was read from.
-    """
-
-    verdict: VerdictKind
+    verdict: VerdictKind  # sticky, backlash, healthy or undecided
+    # of friction of interest: of ``SMALLEST`` or more, and such that a slip of f_S moves PV by more
+    # than its noise, which hides the cycles of less
     probability: float
-    f_s: float
-    f_s_interval: tuple[float, float]
+    f_s: float  # f_s, f_d: median, %; 0 for a valve without friction
+    f_s_interval: tuple[float, float]  # f_s_interval, f_d_interval: 95 % of what is possible, %
     f_d: float
     f_d_interval: tuple[float, float]
-    responded: bool
-    moves_seen: int
-    weights: FloatArray
-    counts: BoolArray
-    trial: Trial
+    responded: bool  # whether PV surely answered OP at all
+    moves_seen: int  # steps of OP in the record
+    weights: FloatArray  # how likely each friction is, shape (G,)
+    counts: BoolArray  # whether it is of interest, shape (G,)
+    trial: Trial  # trial, ideal, sticky, frictions: what it was read from
     ideal: Explanation
     sticky: Explanation
     frictions: Frictions

@@ -37,42 +37,30 @@ CURVATURE = math.log(50.0) / 200.0
 
 
 class Dynamics(NamedTuple):
-    """Process and noise in numbers that are searched without bounds.
+    """Process and noise in numbers that are searched without bounds."""
 
-    Attributes:
-        lag: log of the first lag over the median hold.
-        second: log-odds of the second lag over the first, or over the hold where that is shorter.
-        dead: log-odds of the dead time over the median hold, in which PV answers each move: by a
-            dead time of a whole hold each move could be taken for the one before.
-        load: log of the variance of a step of the load over that of white noise; the load counts
-            by what it makes of PV in a hold.
-        kept: log-odds of the share that first-order noise keeps in a sample.
-        noise: log of its variance over that of white noise.
-    """
-
-    lag: float
+    lag: float  # log of the first lag over the median hold
+    # log-odds of the second lag over the first, or over the hold where that is shorter
     second: float
+    # log-odds of the dead time over the median hold, in which PV answers each move: by a dead time
+    # of a whole hold each move could be taken for the one before
     dead: float
+    # log of the variance of a step of the load over that of white noise; the load counts by what it
+    # makes of PV in a hold
     load: float
-    kept: float
-    noise: float
+    kept: float  # log-odds of the share that first-order noise keeps in a sample
+    noise: float  # log of its variance over that of white noise
 
 
 @dataclasses.dataclass(frozen=True)
 class Shape:
-    """Process and noise in samples.
+    """Process and noise in samples."""
 
-    Attributes:
-        first, second, dead: lags and dead time, samples.
-        load: variance of a step of the load.
-        noise: share kept in a sample, and variance.
-    """
-
-    first: float
+    first: float  # first, second, dead: lags and dead time, samples
     second: float
     dead: float
-    load: float
-    noise: FloatArray
+    load: float  # variance of a step of the load
+    noise: FloatArray  # share kept in a sample, and variance
 
     @classmethod
     def of(cls, dynamics: Dynamics, hold: float) -> Shape:
@@ -110,22 +98,14 @@ def _share(odds: float) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class Answered:
-    """PV and the answers to steps under one process and one noise, made white.
+    """PV and the answers to steps under one process and one noise, made white."""
 
-    Attributes:
-        gram: of the answers, shape (M, M).
-        beside: of the answers with PV, shape (M,).
-        energy: of PV.
-        count: samples that count, less those that the two levels take up.
-        constant: what is added to every log likelihood.
-        bend: change of the square of OP, from where it began, at each step, %², shape (M,).
-    """
-
-    gram: FloatArray
-    beside: FloatArray
-    energy: float
-    count: int
-    constant: float
+    gram: FloatArray  # of the answers, shape (M, M)
+    beside: FloatArray  # of the answers with PV, shape (M,)
+    energy: float  # of PV
+    count: int  # samples that count, less those that the two levels take up
+    constant: float  # what is added to every log likelihood
+    # change of the square of OP, from where it began, at each step, %², shape (M,)
     bend: FloatArray
 
     @classmethod

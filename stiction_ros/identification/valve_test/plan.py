@@ -24,29 +24,19 @@ PAIRS, ROUNDS = 3, 3  # pairs of a round, and rounds
 
 @dataclasses.dataclass(frozen=True)
 class Facts:
-    """What is known of a loop before a round of its test.
+    """What is known of a loop before a round of its test."""
 
-    Attributes:
-        valve: tag.
-        op, pv: where the test begins, % and engineering units.
-        gain: what 1 % of the stem makes of PV within a hold, engineering units, sign included; None
-            where it is not known.
-        noise: standard deviation of the mean of PV over a hold, same units.
-        dead: time after which PV begins to answer, s.
-        hold: s between two moves.
-        op_limit: how far OP may go from ``op``, %.
-        pv_limit: lowest and highest PV, engineering units.
-    """
-
-    valve: str
-    op: float
+    valve: str  # tag
+    op: float  # op, pv: where the test begins, % and engineering units
     pv: float
+    # what 1 % of the stem makes of PV within a hold, engineering units, sign included; None where
+    # it is not known
     gain: float | None
-    noise: float
-    dead: float
-    hold: float
-    op_limit: float
-    pv_limit: tuple[float, float]
+    noise: float  # standard deviation of the mean of PV over a hold, same units
+    dead: float  # time after which PV begins to answer, s
+    hold: float  # s between two moves
+    op_limit: float  # how far OP may go from ``op``, %
+    pv_limit: tuple[float, float]  # lowest and highest PV, engineering units
 
     @property
     def widest(self) -> float:
@@ -60,15 +50,10 @@ class Facts:
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """One round of a test.
+    """One round of a test."""
 
-    Attributes:
-        facts: of the loop.
-        levels: OP after each move, %; the last is where it began.
-    """
-
-    facts: Facts
-    levels: tuple[float, ...]
+    facts: Facts  # of the loop
+    levels: tuple[float, ...]  # OP after each move, %; the last is where it began
 
     @property
     def duration(self) -> float:

@@ -38,21 +38,13 @@ decade or so: a hold lasts for a dead time and one or two lags, a load moves les
 
 @dataclasses.dataclass(frozen=True)
 class Explanation:
-    """Friction, or none, over all processes and noises.
+    """Friction, or none, over all processes and noises."""
 
-    Attributes:
-        evidence: log of how likely the record is.
-        dynamics: the best process and noise.
-        values: log of how likely it is with each set of moves of the stem, shape (U,).
-        gains: K of each, at the best process.
-        noise: σ of the white noise, engineering units.
-    """
-
-    evidence: float
-    dynamics: Dynamics
-    values: FloatArray
-    gains: FloatArray
-    noise: float
+    evidence: float  # log of how likely the record is
+    dynamics: Dynamics  # the best process and noise
+    values: FloatArray  # log of how likely it is with each set of moves of the stem, shape (U,)
+    gains: FloatArray  # K of each, at the best process
+    noise: float  # σ of the white noise, engineering units
 
     def shown(self, hold: float) -> FloatArray:
         """Return what 1 % of the stem makes of PV within a hold of some samples, shape (U,)."""
@@ -70,18 +62,12 @@ class Explanation:
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """A record of steps that is searched.
+    """A record of steps that is searched."""
 
-    Attributes:
-        pv: shape (N,).
-        seen: samples that were measured, shape (N,).
-        steps: of OP.
-        gain: what 1 % of the stem makes of PV within a hold as it was known before; None: nothing.
-    """
-
-    pv: FloatArray
-    seen: BoolArray
-    steps: Steps
+    pv: FloatArray  # shape (N,)
+    seen: BoolArray  # samples that were measured, shape (N,)
+    steps: Steps  # of OP
+    # what 1 % of the stem makes of PV within a hold as it was known before; None: nothing
     gain: float | None = None
 
     @functools.cached_property

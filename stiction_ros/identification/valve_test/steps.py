@@ -19,17 +19,11 @@ FEWEST = 5
 
 @dataclasses.dataclass(frozen=True)
 class Steps:
-    """Steps of OP that rests between them.
+    """Steps of OP that rests between them."""
 
-    Attributes:
-        rows: samples at which OP moved, (M,).
-        levels: OP before the first step and after each, (M + 1,), %.
-        count: samples of the record.
-    """
-
-    rows: IntArray
-    levels: FloatArray
-    count: int
+    rows: IntArray  # samples at which OP moved, (M,)
+    levels: FloatArray  # OP before the first step and after each, (M + 1,), %
+    count: int  # samples of the record
 
     @classmethod
     def of(cls, op: FloatArray) -> Steps:

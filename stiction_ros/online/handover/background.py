@@ -10,13 +10,9 @@ T = TypeVar("T")
 
 
 class Background(Protocol):
-    """Runs what would make a step long: reading a model, building and judging a controller.
+    """Runs what would make a step long: reading a model, building and judging a controller."""
 
-    Attributes:
-        ahead: whether work is begun as soon as it is known, or when its result is due.
-    """
-
-    ahead: bool
+    ahead: bool  # whether work is begun as soon as it is known, or when its result is due
 
     def submit(self, work: Callable[..., T], *arguments: Any) -> Future[T]:
         """Return a future of ``work(*arguments)``; it may hold what the work raised."""

@@ -14,36 +14,22 @@ from stiction_ros.online.handover.past import Past
 
 @dataclasses.dataclass(frozen=True)
 class Ready:
-    """A controller that has taken in the past, or why it may not take over.
+    """A controller that has taken in the past, or why it may not take over."""
 
-    Attributes:
-        controller: as of ``seen``; None where there is a doubt.
-        seen: how many samples of the loop it has taken in.
-        doubt: why the past speaks against it; empty for nothing.
-    """
-
-    controller: MpcController | None
-    seen: int
-    doubt: str
+    controller: MpcController | None  # as of ``seen``; None where there is a doubt
+    seen: int  # how many samples of the loop it has taken in
+    doubt: str  # why the past speaks against it; empty for nothing
 
 
 @dataclasses.dataclass
 class HandOver:
-    """One change of controller on its way.
+    """One change of controller on its way."""
 
-    Attributes:
-        at: the first sample of the new controller, if it is ready by then.
-        reason: why it takes over.
-        model: whose valves it knows.
-        make: builds it; may raise InputError.
-        judge: holds it against the past; None where it is not judged.
-    """
-
-    at: int
-    reason: str
-    model: LoopModel
-    make: Maker
-    judge: Judge | None = None
+    at: int  # the first sample of the new controller, if it is ready by then
+    reason: str  # why it takes over
+    model: LoopModel  # whose valves it knows
+    make: Maker  # builds it; may raise InputError
+    judge: Judge | None = None  # holds it against the past; None where it is not judged
     _work: Future[Ready] | None = None
 
     def prepare(self, background: Background, past: Past) -> None:

@@ -62,19 +62,12 @@ class OfferRule:
 
 @dataclasses.dataclass(frozen=True)
 class Judge:
-    """Holds an offered controller against the past; runs wherever its user wants.
+    """Holds an offered controller against the past; runs wherever its user wants."""
 
-    Attributes:
-        rule: how much, and how many samples.
-        in_force: makes a twin of the controller in force.
-        offered_before: the offered friction was in force once and was rolled back.
-        last_samples: how many samples the offered model says it holds for; 0 for all.
-    """
-
-    rule: OfferRule
-    in_force: Maker
-    offered_before: bool = False
-    last_samples: int = 0
+    rule: OfferRule  # how much, and how many samples
+    in_force: Maker  # makes a twin of the controller in force
+    offered_before: bool = False  # the offered friction was in force once and was rolled back
+    last_samples: int = 0  # how many samples the offered model says it holds for; 0 for all
 
     def doubt(self, offered: Maker, past: History) -> str:
         """Return why ``past``, up to the present sample, speaks against it, or an empty text."""
