@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LINES = 75_898
+LINES = 75_908
 LINES_OF_STUDIES = 23_306
 NUMERIC_CONSTANTS = 931
 
