@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from collections import defaultdict
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from graph import Graph
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from stiction_ros.cli.main import main
 from stiction_ros.config_files import find_config
 from stiction_ros.nodes.controller import ControllerNode
 from stiction_ros.nodes.plant import PlantNode
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS
+from stiction_ros.online.replays.result import Match
+from stiction_ros.online.replays.run import replay
 from stiction_ros.online.session import LiveRun
 from stiction_ros.online.unit import UnitScenario, run_unit
 
@@ -92,3 +99,37 @@ def test_loops_that_do_not_fit_the_plant_are_refused(scenario: UnitScenario) -> 
     node.start()
     assert "FV9 is not of the plant" in node.failure
     graph.close()
+
+
+def small(folder: Path) -> Path:
+    """Write a cascade that is swapped at sample 905, and return its file."""
+    for file in find_config("cascade.scenario.yaml").parent.glob("cascade*"):
+        shutil.copy(file, folder)
+    (folder / "cascade.set_points.yaml").write_text(
+        "repeat: 1000.0\nmoves: [{time: 0.0, F1: 50.0, L1: 50.0}, {time: 100.0, L1: 50.5}]\n"
+    )
+    path = folder / "cascade.scenario.yaml"
+    nodes = yaml.safe_load(path.read_text(encoding="utf-8"))
+    schedule = {"fit_first": 600, "fit_every": 300}
+    nodes["plant"]["ros__parameters"]["samples"] = 1600
+    nodes["/**/controller"]["ros__parameters"] |= schedule
+    nodes["/**/estimator"]["ros__parameters"] |= schedule | {"window": 900}
+    path.write_text(yaml.safe_dump(nodes), encoding="utf-8")
+    return path
+
+
+@pytest.mark.trial
+def test_a_demo_of_several_loops_is_recorded_replayed_and_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["demo", str(small(tmp_path)), "--out", str(tmp_path / "out")]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Service FV1 and 2 loops stop cycling." in said
+    folder = tmp_path / "out" / "cascade"
+    for loop in LOOPS:
+        assert replay(folder / "bag", namespace=loop).match is Match.EQUAL
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["swapped"] == "FC1"
+    assert summary["neighbours"]["sources"] == {"FC1": "FV1"}
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "disturbed by FC1" in page
