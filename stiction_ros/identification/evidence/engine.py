@@ -108,9 +108,7 @@ def concluded(
     found = _identification(record, data, part, options, best)
     closed = close_loop(record, found)
     silent = [[loss_without_response(look, j) for look in seen] for j in range(len(agreed))]
-    told = [
-        figures_of(seen, silent[j], one, j, closed, part.op[:, j]) for j, one in enumerate(agreed)
-    ]
+    told = [figures_of(seen, silent[j], one, j, closed) for j, one in enumerate(agreed)]
     best = tuple(
         dataclasses.replace(one, responds=responds(seen, silent[j], j, options.confidence))
         for j, one in enumerate(best)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.closed_loop import ClosedLoop
 from stiction_ros.identification.evidence.echoes import echo
 from stiction_ros.identification.evidence.rates import Agreement, Look
 from stiction_ros.identification.judgement.figures import Figures
-from stiction_ros.signals.cycle_shape import CycleShape
 
 ENDLESS = 100.0  # ratio that stands for a movement that grows without end
 FEW = 2.0
@@ -25,7 +22,6 @@ def figures_of(
     agreed: Agreement,
     valve: int,
     closed: ClosedLoop,
-    op: FloatArray,
 ) -> Figures:
     """Return the figures of one valve.
 
@@ -35,7 +31,6 @@ def figures_of(
         agreed: the rates that agree best on its friction.
         valve: index.
         closed: the loops, closed again with the best friction.
-        op: of the valve, shape (N,).
     """
     gains = [_gain(look, loss, valve) for look, loss in zip(seen, silent, strict=True)]
     sees = [look for look in seen if look.sees_process(valve)] or list(seen)
@@ -43,7 +38,6 @@ def figures_of(
     repeated = max(echo(look.problem, look.found.without[valve]) for look in seen)
     loop = closed.valves[valve]
     output = next((one for one in closed.outputs if one.name == loop.output), closed.outputs[0])
-    shape = CycleShape.of(op)
     beyond = 0.5 * min(agreed.gain, 2.0 * max(gains))
     return Figures(
         gain=beyond if agreed.alike else min(beyond, 0.0),
@@ -54,7 +48,6 @@ def figures_of(
         controller_fit=0.0 if loop.controller is None else loop.controller.r_squared,
         band_share=min(loop.band_share, ENDLESS),
         cycle_share=0.0 if output.oscillation is None else output.oscillation.share,
-        **dataclasses.asdict(shape),
     )
 
 

@@ -69,17 +69,6 @@ class Figures:
         "part of the variance of PV − SP that belongs to one cycle",
         "the cycle is not of the kind that friction makes",
     )
-    half_cycles: float = _figure(
-        "ratio",
-        "standard deviation of the times between crossings of OP through its slow mean, divided by "
-        "their mean",
-        "the half cycles of OP are not of the lengths that friction makes",
-    )
-    kurtosis: float = _figure(
-        "ratio",
-        "kurtosis of OP about its slow mean: 1.8 for a triangle, 3 for noise",
-        "OP does not move between two ends, as in a friction cycle",
-    )
 
     def to_dict(self) -> dict[str, float]:
         """Return the figures by name."""
