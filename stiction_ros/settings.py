@@ -139,12 +139,15 @@ def changed(settings: Any, values: Mapping[str, Any], node: str, configured: boo
 
 
 def check(entry: Setting, value: Any, where: str) -> Any:
-    """Return ``value`` in the type of ``entry``, or raise InputError."""
+    """Return ``value`` in the type of ``entry``, or raise InputError.
+
+    Empty texts of a list are left out: ROS has no empty list of texts and writes ``[""]``.
+    """
     place = f"{where}: {entry.name}"
     if entry.kind in ("floats", "strings"):
         if isinstance(value, str) or not hasattr(value, "__iter__"):
             raise InputError(f"{value!r} is no list", where=place, fix="write [a, b]")
-        return tuple(_check_one(entry, item, place) for item in value)
+        return tuple(_check_one(entry, item, place) for item in value if item != "")
     return _check_one(entry, value, place)
 
 

@@ -52,7 +52,7 @@ class OpcuaNode(ManagedNode):
         require_asyncua()
         if not settings.tags:
             raise InputError("no tag map", where="opcua: tags", fix="set it to a *.tags.yaml")
-        self._writes = tuple(name for name in settings.write if name)
+        self._writes = settings.write
         told = TagMap.load(find_config(settings.tags))
         self._loops = self._chosen(told)
         self._url = settings.url or told.server
@@ -74,7 +74,7 @@ class OpcuaNode(ManagedNode):
     def _chosen(self, told: TagMap) -> tuple[LoopTags, ...]:
         """Return the loops that are bridged; those to be written must be able to."""
         known = {tags.loop: tags for tags in told.loops}
-        chosen = tuple(name for name in self.settings.loops if name)
+        chosen = self.settings.loops
         for key, names in (("loops", chosen), ("write", self._writes)):
             for name in names:
                 if name not in known:

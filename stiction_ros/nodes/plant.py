@@ -80,8 +80,7 @@ class PlantNode(ManagedNode):
         self._start = round(settings.start_time * SECOND)
         self.stamp = self._start
         self._realtime = settings.pace == "realtime"
-        told = [line for line in settings.loops if line]  # ROS has no list of texts that is empty
-        loops = read_member_loops(told, self.model, "plant: loops")
+        loops = read_member_loops(settings.loops, self.model, "plant: loops")
         self.wiring = Wiring(self.model, loops or [whole_plant(self.model)])
         self.round_trips = RoundTrips()
         self._missed = self._repeats = 0

@@ -52,7 +52,7 @@ class RecorderNode(ManagedNode):
 
     def configure(self) -> None:
         settings = self.settings
-        names = [self.resolve_topic_name(name) for name in settings.topics if name]
+        names = [self.resolve_topic_name(name) for name in settings.topics]
         space = self.get_namespace()
         self._wanted = topic_choice(names, settings.regex, settings.exclude_regex, space)
         splitting = Splitting(settings.max_bag_size, round(settings.max_bag_duration * SECOND))

@@ -121,11 +121,10 @@ class Peers:
     def __init__(self, node: Node, wait_for: Sequence[str]) -> None:
         """Wait for the entries of ``wait_for`` on behalf of ``node``."""
         self._node = node
-        entries = [entry for entry in wait_for if entry]
-        self.names = tuple(sorted({e for e in entries if not _is_topic(e)}))
+        self.names = tuple(sorted({e for e in wait_for if not _is_topic(e)}))
         self.topics = tuple(
             sorted(
-                {node.resolve_topic_name(e.removeprefix(TOPIC)) for e in entries if _is_topic(e)}
+                {node.resolve_topic_name(e.removeprefix(TOPIC)) for e in wait_for if _is_topic(e)}
             )
         )
         self._pinned: dict[str, frozenset[tuple[int, ...]]] = {}
