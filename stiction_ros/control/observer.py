@@ -15,7 +15,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
 
 FORGETTING = 0.98  # of the running mean square of what was passed on
-LIVELY = 2.0  # innovations beyond this many times the usual one count as no more than that
+LIVELY = 2.0  # usual innovations, as which a larger one counts in that mean
 
 
 class ObserverKind(enum.StrEnum):
@@ -184,9 +184,9 @@ def _luenberger(model: LinearModel, tuning: ObserverTuning) -> FloatArray:
 class InnovationGate:
     """Holds back innovations that are far too large, until they last.
 
-    The gate of an output stands at ``width`` times its expected standard deviation, or that
-    of the innovations passed on lately where it is larger, so that a noise that was given
-    too small does not close it. It widens by 3 % a sample at most, so that bad values do not
+    The gate of an output stands at ``width`` times a standard deviation: the expected one, or that
+    of the innovations passed on lately if this is larger. So the gate stays open where the noise
+    was given too small. It widens by 3 % a sample at most, so that bad values do not
     open it for others. After ``patience`` successive samples beyond it the change is real and
     is passed on in growing portions, one gate width more at each sample, until an innovation
     fits again: a step of a few units passes at once, a value out of all proportion does not.

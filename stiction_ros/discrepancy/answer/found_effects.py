@@ -42,13 +42,12 @@ class FoundEffect:
     units: Mapping[str, str]  # of the parameters
     intervals: Mapping[str, tuple[float, float]]  # 95 % of each parameter that has one
     delta_bic: float  # BIC by which it beats the model without it
-    # share of the free-run excess that is gone with it and not without it; NaN for what no free run
-    # shows
+    # share of the free-run excess that goes when it is added last; NaN where no free run shows it
     closed: float
     verdict: GapVerdict  # named or ambiguous
     # places and effects that the record does not tell from it
     alternatives: tuple[tuple[str, str], ...] = ()
-    sentence: str = ""  # why it and not its rivals
+    sentence: str = ""  # why this effect was named, and not a rival
     # what it adds to the free run, shape (N, p), units of PV; None for what no free run shows
     moves: FloatArray | None = dataclasses.field(default=None, compare=False, repr=False)
 

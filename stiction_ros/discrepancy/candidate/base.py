@@ -25,8 +25,7 @@ class Response:
     shifts: Mapping[int, FloatArray]  # per output, shape (N, G): added as it is
     # per output, shape (N, G, s): added with s factors that least squares finds
     sizes: Mapping[int, FloatArray] = dataclasses.field(default_factory=dict)
-    # which points are figures that the effect can have, shape (G,); None for all. What is said of
-    # the others is never used
+    # which points are figures that the effect can have, shape (G,); None for all
     possible: BoolArray | None = None
 
     @property
@@ -69,8 +68,8 @@ class Candidate(ABC):
     place: str  # place, effect: as loop models name them, such as ``valve:V1`` and ``stiction``
     effect: str
     axes: tuple[Axis, ...] = ()  # of the figures that are searched; may be empty
-    factors: int = 0  # number of figures that least squares finds
-    # places and effects that no record of OP and PV tells from this one
+    factors: int = 0  # figures that least squares finds
+    # places and effects that look the same in every record of OP and PV
     twins: tuple[tuple[str, str], ...] = ()
     # whether it belongs to the catalogue; others show only that something is amiss
     inside: bool = True
@@ -270,7 +269,7 @@ def lasts(candidate: Candidate, point: FloatArray) -> bool:
 
 
 QUARTER = 0.25
-"""Sample: what counts of a stem is its mean within one, from its end (a jump) to its middle."""
+"""Of a sample: the mean of a stem within a sample may belong to its end or to its middle."""
 
 
 def late_axes(asked: bool) -> tuple[Axis, ...]:

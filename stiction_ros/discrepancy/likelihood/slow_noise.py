@@ -47,7 +47,7 @@ def _searched(
     share = 1.0
     step = np.zeros(2)
     for _ in range(ROUNDS):
-        left = before = total = 0.0
+        left = total = 0.0
         slope, cross, gram = np.zeros(2), np.zeros(2), np.zeros((2, 2))
         for k in range(1, len(residual)):
             slope[0] = forget * slope[0] - residual[k - 1]
