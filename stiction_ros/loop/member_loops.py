@@ -20,18 +20,13 @@ _ENTRY = re.compile(r"\s*(?P<name>[A-Za-z]\w*)\s*:(?P<valves>[^>]+)->(?P<outputs
 
 @dataclasses.dataclass(frozen=True)
 class MemberLoop:
-    """One of several loops of a plant.
+    """One of several loops of a plant."""
 
-    Attributes:
-        name: of the loop, which is the namespace of its nodes.
-        valves: what its OP moves: valves of the plant, or ``TAG.SP`` for the set-point of an
-            output that another loop controls.
-        outputs: its PVs.
-    """
-
-    name: str
+    name: str  # of the loop, which is the namespace of its nodes
+    # what its OP moves: valves of the plant, or ``TAG.SP`` for the set-point of an output that
+    # another loop controls
     valves: tuple[str, ...]
-    outputs: tuple[str, ...]
+    outputs: tuple[str, ...]  # its PVs
 
 
 def read_member_loops(entries: Sequence[str], model: LoopModel, where: str) -> list[MemberLoop]:

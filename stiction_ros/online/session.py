@@ -25,6 +25,7 @@ from stiction_ros.loop import (
     read_valve_changes,
     simulate_closed_loop,
 )
+from stiction_ros.loop.closed_loop import Controller
 from stiction_ros.loop.valve_changes import valve_changes_text
 from stiction_ros.loop.yaml_reading import Section, load_yaml
 from stiction_ros.online.controller.live import ModeChange
@@ -101,6 +102,28 @@ class SimulatedPlant:
     samples: int
     valve_changes: tuple[ValveChange, ...]
 
+    def with_ideal_valves(self) -> SimulatedPlant:
+        """Return the same plant with valves that follow OP exactly, to the end."""
+        return dataclasses.replace(self, model=self.model.with_ideal_valves(), valve_changes=())
+
+    def run(
+        self,
+        controller: Controller,
+        seed: int | None = None,
+        samples: int | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> ClosedLoopRun:
+        """Simulate the plant under ``controller``; ``seed`` and ``samples`` in place of its own."""
+        return simulate_closed_loop(
+            self.model,
+            controller,
+            self.set_points,
+            self.samples if samples is None else samples,
+            self.seed if seed is None else seed,
+            progress,
+            self.valve_changes,
+        )
+
 
 def read_plant(values: Mapping[str, Any], path: Path) -> SimulatedPlant:
     """Return what the parameters of the plant in the scenario file ``path`` name.
@@ -161,6 +184,13 @@ class Scenario:
 
     def __repr__(self) -> str:
         return f"<Scenario {self.name}: {self.samples} samples of {self.plant!r}, seed {self.seed}>"
+
+    @property
+    def simulated(self) -> SimulatedPlant:
+        """The plant with its set-points, seed, samples and changes."""
+        return SimulatedPlant(
+            self.plant, self.set_points, self.seed, self.samples, self.valve_changes
+        )
 
     @classmethod
     def load(cls, path: Path | str) -> Scenario:
@@ -365,15 +395,6 @@ def run_live(
         >>> live.run.record.pv.shape, live.swap
         ((60, 1), None)
     """
-    plant = scenario.plant.with_ideal_valves() if ideal_valves else scenario.plant
-    loop = LoopSession(scenario, plant, identify)
-    run = simulate_closed_loop(
-        plant,
-        loop,
-        scenario.set_points,
-        scenario.samples if samples is None else samples,
-        scenario.seed if seed is None else seed,
-        progress,
-        () if ideal_valves else scenario.valve_changes,
-    )
-    return loop.told(run)
+    plant = scenario.simulated.with_ideal_valves() if ideal_valves else scenario.simulated
+    loop = LoopSession(scenario, plant.model, identify)
+    return loop.told(plant.run(loop, seed, samples, progress))

@@ -17,7 +17,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.loop import ClosedLoopRun, LoopModel, Measurement, simulate_closed_loop
+from stiction_ros.loop import ClosedLoopRun, LoopModel, Measurement
 from stiction_ros.loop.member_loops import MemberLoop, Wiring, read_member_loops
 from stiction_ros.loop.yaml_reading import Section, load_yaml
 from stiction_ros.online.session import (
@@ -32,25 +32,13 @@ from stiction_ros.online.session import (
 from stiction_ros.records import Record
 from stiction_ros.settings import from_mapping as settings_from_mapping
 
-SHARED = ("plant", "recorder")
-"""Nodes that all loops of a plant share."""
-
-OWN = ("controller", "estimator")
-"""Nodes of each loop."""
+SHARED = ("plant", "recorder")  # nodes that all loops of a plant share
+OWN = ("controller", "estimator")  # nodes of each loop
 
 
 @dataclasses.dataclass(frozen=True)
 class UnitScenario:
     """One scenario file of several loops on one plant.
-
-    Attributes:
-        name: stem of the file.
-        path: the file.
-        nodes: parameters by node: ``plant``, ``recorder``, ``TC1/controller`` …
-        plant: what is simulated.
-        loops: tags of each loop.
-        members: the scenario of each loop by itself, in the same order; its plant is the process
-            that its controller knows.
 
     Examples:
         >>> from stiction_ros import find_config
@@ -59,11 +47,14 @@ class UnitScenario:
         MemberLoop(name='TC1', valves=('FV1',), outputs=('T1',))
     """
 
-    name: str
-    path: Path
+    name: str  # stem of the file
+    path: Path  # the file
+    # parameters by node: ``plant``, ``recorder``, ``TC1/controller`` …
     nodes: Mapping[str, Mapping[str, Any]]
-    plant: SimulatedPlant
-    loops: tuple[MemberLoop, ...]
+    plant: SimulatedPlant  # what is simulated
+    loops: tuple[MemberLoop, ...]  # tags of each loop
+    # the scenario of each loop by itself, in the same order; its plant is the process that its
+    # controller knows
     members: Mapping[str, Scenario]
 
     @classmethod
@@ -174,17 +165,9 @@ def run_unit(
     Raises:
         InputError: a controller cannot be built from its process.
     """
-    plant, sessions = scenario.plant, _Sessions(scenario, identify)
-    model = plant.model.with_ideal_valves() if ideal_valves else plant.model
-    run = simulate_closed_loop(
-        model,
-        sessions,
-        plant.set_points,
-        plant.samples if samples is None else samples,
-        plant.seed if seed is None else seed,
-        progress,
-        () if ideal_valves else plant.valve_changes,
-    )
+    sessions = _Sessions(scenario, identify)
+    plant = scenario.plant.with_ideal_valves() if ideal_valves else scenario.plant
+    run, model = plant.run(sessions, seed, samples, progress), plant.model
     wiring, sp, found = sessions.wiring, np.array(sessions.sp), {}
     for loop, session, op in zip(wiring.loops, sessions.sessions, sessions.op, strict=True):
         columns = [model.valve_names.index(tag) for tag in loop.valves if tag in model.valve_names]

@@ -24,19 +24,13 @@ from stiction_ros.survey.survey_options import SurveyOptions
 
 @dataclasses.dataclass(frozen=True)
 class Disturbed:
-    """A loop that cycles with a valve of another one.
+    """A loop that cycles with a valve of another one."""
 
-    Attributes:
-        name: of the loop.
-        by: name of the loop whose valve it is.
-        period: of the group, s.
-        behind: s from the beginning of a cycle of the source to that of this loop, at most half a
-            period either way; negative where this loop begins first.
-    """
-
-    name: str
-    by: str
-    period: float
+    name: str  # of the loop
+    by: str  # name of the loop whose valve it is
+    period: float  # of the group, s
+    # s from the beginning of a cycle of the source to that of this loop, at most half a period
+    # either way; negative where this loop begins first
     behind: float
 
     @property
@@ -51,19 +45,12 @@ class Disturbed:
 
 @dataclasses.dataclass(frozen=True)
 class Neighbours:
-    """What is said of the loops of one plant.
+    """What is said of the loops of one plant."""
 
-    Attributes:
-        entries: of the survey, by the name of the loop.
-        groups: of the survey: loops that cycle together, the likely source first.
-        sources: valves to service, by the name of their loop.
-        disturbed: loops whose cycle comes from one of these valves.
-    """
-
-    entries: Mapping[str, Entry]
-    groups: tuple[Group, ...]
-    sources: Mapping[str, str]
-    disturbed: tuple[Disturbed, ...]
+    entries: Mapping[str, Entry]  # of the survey, by the name of the loop
+    groups: tuple[Group, ...]  # of the survey: loops that cycle together, the likely source first
+    sources: Mapping[str, str]  # valves to service, by the name of their loop
+    disturbed: tuple[Disturbed, ...]  # loops whose cycle comes from one of these valves
 
     @property
     def sentences(self) -> list[str]:

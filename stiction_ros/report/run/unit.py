@@ -29,21 +29,14 @@ UNIT_COLUMNS = (
 
 @dataclasses.dataclass(frozen=True)
 class UnitReport:
-    """The loops of one run, and what is said of them together.
+    """The loops of one run, and what is said of them together."""
 
-    Attributes:
-        name: of the run.
-        stories: of the loops, by name; the phases of all are those of the first swap.
-        swapped: name of the loop whose controller was swapped first; empty where none was.
-        found: which valve it is, from what was recorded before that swap.
-        page: ``report.html``; None before it is written.
-    """
-
-    name: str
+    name: str  # of the run
+    # of the loops, by name; the phases of all are those of the first swap
     stories: Mapping[str, Story]
-    swapped: str
-    found: Neighbours
-    page: Path | None = None
+    swapped: str  # name of the loop whose controller was swapped first; empty where none was
+    found: Neighbours  # which valve it is, from what was recorded before that swap
+    page: Path | None = None  # ``report.html``; None before it is written
 
     @property
     def status(self) -> str:
