@@ -3,8 +3,6 @@
 For control engineers. Run it on your own file: python examples/01_is_it_the_valve.py loop.csv
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

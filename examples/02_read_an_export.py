@@ -3,8 +3,6 @@
 For control engineers. What was left out is said in the notes of the record.
 """
 
-from __future__ import annotations
-
 import datetime
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 For maintenance planners. The loop model may be one that was identified.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros import LoopModel, Record, SetPoints, find_config, simulate

@@ -3,8 +3,6 @@
 For maintenance planners. Here the loops are simulated; put a list of files in their place.
 """
 
-from __future__ import annotations
-
 from stiction_ros import HeStiction, Identification, LoopModel, find_config, identify, simulate
 
 FRICTION = {"FIC101": 0.0, "FIC102": 2.0, "FIC103": 6.0}  # f_S, %, true of the simulated loops

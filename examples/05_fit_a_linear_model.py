@@ -3,8 +3,6 @@
 For control engineers. The valve moves at random between two levels, in open loop.
 """
 
-from __future__ import annotations
-
 from stiction_ros import LinearOptions, LoopModel, find_config, fit_linear, prbs_experiment
 
 

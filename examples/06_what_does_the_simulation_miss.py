@@ -3,8 +3,6 @@
 For control engineers. The truth has a valve with backlash; the model does not know.
 """
 
-from __future__ import annotations
-
 from stiction_ros import GapOptions, LoopModel, SetPoints, effects, find_config, find_gap, simulate
 
 

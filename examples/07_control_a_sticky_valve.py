@@ -3,8 +3,6 @@
 For researchers. Example 1: f_S = 5 %, f_D = 2 %; the plant sticks in both runs.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros import (

@@ -4,8 +4,6 @@ For ROS engineers: what plant, controller and estimator do as nodes, in one proc
 in lockstep and with the same seed the nodes give the same numbers, bit for bit.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros import LiveRun, Scenario, find_config, run_live

@@ -3,8 +3,6 @@
 For ROS engineers. No running ROS is needed; `ros2 bag play flow_bag` replays it into a graph.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

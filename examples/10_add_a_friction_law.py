@@ -12,8 +12,6 @@ out is said, never guessed:
 - ``axes``: on what ``stiction gap`` searches it. Without it gap lists it as not considered.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

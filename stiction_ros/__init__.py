@@ -17,8 +17,6 @@ Examples:
     sticky
 """
 
-from __future__ import annotations
-
 import importlib
 from typing import TYPE_CHECKING, Any
 

@@ -4,8 +4,6 @@ Settings and ROS parameters, the keys of YAML files and the parameters of behavi
 they take; all of them are checked here, so that the same mistake is told by the same sentence.
 """
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Iterable

@@ -7,8 +7,6 @@ logged once as information.
 Importing this module costs half a second: only what loops over whole records does so.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import inspect

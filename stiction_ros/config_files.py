@@ -1,7 +1,5 @@
 """Where configuration files are found: as given, else among those that come along."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The tuning of a controller as its user writes it, and the design made from it."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import functools

@@ -4,8 +4,6 @@
 worker of a survey loads, and most of these never need them.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The one error that users see: what is wrong, where, and how to mend it."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
 from collections.abc import Iterator
@@ -35,7 +33,7 @@ class InputError(ValueError):
         self.fix = fix
         super().__init__((f"{where}: " if where else "") + what + (f"; {fix}" if fix else ""))
 
-    def within(self, place: str) -> InputError:
+    def within(self, place: str) -> "InputError":
         """Return the same error with ``place`` put before where it was found."""
         where = f"{place}: {self.where}" if self.where else place
         return InputError(self.what, where=where, fix=self.fix)

@@ -7,8 +7,6 @@ subtracted, multiplied and divided, and multiplied by a number. In type hints a 
 of LANES numbers; there are none outside compiled code.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable
 from typing import Any, cast

@@ -5,8 +5,6 @@ a core busy. Command and nodes say so by the environment before anything is load
 from a process of his own gets the same by a limit that ends with the call.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

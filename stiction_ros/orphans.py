@@ -1,7 +1,5 @@
 """Processes that must not outlive the one that started them, and that it alone ends."""
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import os

@@ -4,8 +4,6 @@ The same declaration checks a parameter file, declares the ROS parameters of a n
 is printed in the documentation.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import typing

@@ -1,7 +1,5 @@
 """Values and times as texts: JSON that every reader takes, times as people say them."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

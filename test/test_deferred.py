@@ -1,7 +1,5 @@
 """What stands in for slow packages of SciPy gives their numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import signal, stats

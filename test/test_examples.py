@@ -1,7 +1,5 @@
 """The examples for users: each runs, at a small size, and says what it promises."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import sys

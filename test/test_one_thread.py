@@ -1,7 +1,5 @@
 """Linear algebra on one thread, and as many as before afterwards."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits

@@ -1,7 +1,5 @@
 """What `from stiction_ros import …` gives, and that its documentation is true."""
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import doctest

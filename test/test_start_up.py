@@ -1,7 +1,5 @@
 """What a process loads before it does anything."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -6,8 +6,6 @@ are all that it promises; those of the floors below, docstrings and comments are
 numeric constants have ceilings, which ``test/packaging/test_ceilings.py`` holds.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import dataclasses

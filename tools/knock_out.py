@@ -9,8 +9,6 @@ wrong are these called healthy, and healthy ones in which friction is found. Sec
 record, from its rates to the answer. ``--log`` goes on where it was broken off.
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import json

@@ -5,8 +5,6 @@ a paragraph that ends in ``::`` begins a block of code by its indent, and an ent
 arguments or attributes becomes one entry for each.
 """
 
-from __future__ import annotations
-
 import inspect
 import re
 from typing import Any

@@ -10,8 +10,6 @@ No package should have more than ``MOST`` doors in one call. Those that have mor
 or no longer needed.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys
@@ -66,7 +64,7 @@ class Ways:
         self._packages: dict[str, str] = {}
         self._names: dict[CodeType, str] = {}
 
-    def __enter__(self) -> Ways:
+    def __enter__(self) -> "Ways":
         threading.setprofile(self._look)
         sys.setprofile(self._look)
         return self

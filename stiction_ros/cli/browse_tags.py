@@ -1,7 +1,5 @@
 """``stiction browse-tags``: a tag map made by browsing a control system."""
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``stiction certificates``: make our own, pin that of a server, show one."""
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import datetime
@@ -110,7 +108,7 @@ def _show(options: argparse.Namespace) -> int:
     return 0
 
 
-async def _certificate_of(url: str) -> x509.Certificate:
+async def _certificate_of(url: str) -> "x509.Certificate":
     """Return what the server shows at its endpoint for signed and encrypted sessions."""
     from asyncua import ua
 
@@ -129,7 +127,7 @@ async def _certificate_of(url: str) -> x509.Certificate:
     )
 
 
-def _describe(certificate: x509.Certificate) -> None:
+def _describe(certificate: "x509.Certificate") -> None:
     from cryptography import x509
 
     from stiction_ros.opcua.security import fingerprint

@@ -1,7 +1,5 @@
 """``stiction convert``: a record from CSV to bag and from bag to CSV."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``stiction demo``: a live loop from limit cycle to compensation, recorded and reported."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil
@@ -93,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_scenario(
-    scenario: Scenario | UnitScenario, directory: Path, options: argparse.Namespace, show: Bar
+    scenario: "Scenario | UnitScenario", directory: Path, options: argparse.Namespace, show: Bar
 ) -> bool:
     """Run one scenario and print its table; return whether it succeeded."""
     from stiction_ros.online.session import Scenario
@@ -123,7 +121,7 @@ def _run_scenario(
     return bool(report.summary["status"] == "ok")
 
 
-def _report_unit(scenario: UnitScenario, directory: Path, seconds: float) -> bool:
+def _report_unit(scenario: "UnitScenario", directory: Path, seconds: float) -> bool:
     """Write the page of all loops and print what it says; return whether the run succeeded."""
     from rich.console import Console
     from rich.table import Table

@@ -1,7 +1,5 @@
 """``stiction experiment``: simulated identification experiments, written as records."""
 
-from __future__ import annotations
-
 import argparse
 import shlex
 import sys

@@ -4,8 +4,6 @@ It names a table by an entry point of the group ``stiction.commands``: commands,
 are typed (``demo opcua``), to their module and what ``--help`` says.
 """
 
-from __future__ import annotations
-
 import argparse
 import functools
 import importlib

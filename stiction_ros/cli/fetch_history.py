@@ -1,7 +1,5 @@
 """``stiction fetch-history``: history of a control system into records."""
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import datetime

@@ -1,7 +1,5 @@
 """``stiction fit-linear``: a linear model of a record, without friction."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -100,7 +98,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _print(name: str, found: LinearIdentification) -> None:
+def _print(name: str, found: "LinearIdentification") -> None:
     console = Console()
     title = f"{name}: {found.kind}, {found.samples} samples, {found.status}"
     table = Table(title=title, title_justify="left")
@@ -131,7 +129,7 @@ def _number(value: complex) -> str:
     return f"{value.real:.4f}{value.imag:+.4f}j"
 
 
-def _rivals(found: LinearIdentification) -> Table:
+def _rivals(found: "LinearIdentification") -> Table:
     """Return the table of the orders that were tried; the one taken is marked."""
     from stiction_ros.identification.linear.subspace import StateSpaceFit
 

@@ -1,7 +1,5 @@
 """``stiction gain``: what would help a loop, simulated."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -120,7 +118,7 @@ def _of_record(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
     return gain, _verdict(record, identified, gain)
 
 
-def _verdict(record: Record, identified: Identification, gain: Any) -> dict[str, Any]:
+def _verdict(record: "Record", identified: "Identification", gain: Any) -> dict[str, Any]:
     """Return what was found of the valve that was looked at, as it stands in the JSON."""
     index = record.valves.index(gain.valve)
     valve = identified.valves[index].to_dict()

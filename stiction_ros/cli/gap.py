@@ -1,7 +1,5 @@
 """``stiction gap``: what a simulation misses, from records of the loop."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys
@@ -120,7 +118,7 @@ def _record(path: str, options: argparse.Namespace) -> Record:
     return longest_part([only_part(loop.parts, path)])
 
 
-def _write(found: Discrepancy, directory: Path) -> None:
+def _write(found: "Discrepancy", directory: Path) -> None:
     from stiction_ros.report.gap.report import report_gap
 
     with storing(directory, what="made"):
@@ -129,7 +127,7 @@ def _write(found: Discrepancy, directory: Path) -> None:
     print(f"report: {report_gap(found, directory)}", file=sys.stderr)
 
 
-def _print(found: Discrepancy) -> None:
+def _print(found: "Discrepancy") -> None:
     from stiction_ros.report.gap.words import called, plain
 
     console = Console()
@@ -182,7 +180,7 @@ def _print(found: Discrepancy) -> None:
         console.print(f"note: {note}", markup=False)
 
 
-def _gaps(found: Discrepancy) -> Table:
+def _gaps(found: "Discrepancy") -> Table:
     title = f"gap on held-out samples; closed {100.0 * found.closed:.0f} % of its excess"
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for head in ("output", "free run", "after", "noise", "one step", "after", "noise"):

@@ -1,7 +1,5 @@
 """``stiction identify``: friction, process and a verdict per valve from one record."""
 
-from __future__ import annotations
-
 import argparse
 import shlex
 import sys
@@ -131,7 +129,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _write_model(record: Record, found: Identification, target: str) -> None:
+def _write_model(record: "Record", found: "Identification", target: str) -> None:
     from stiction_ros.identification.answer.identified_loop import identified_loop
 
     name = Path(target).name.removesuffix(".yaml").removesuffix(".loop")
@@ -140,7 +138,7 @@ def _write_model(record: Record, found: Identification, target: str) -> None:
         model.save(target)
 
 
-def _print(document: Mapping[str, Any], found: Identification) -> None:
+def _print(document: Mapping[str, Any], found: "Identification") -> None:
     from stiction_ros.identification.answer.summary import rows
     from stiction_ros.identification.answer.words import cycle, materiality, next_step, why
 
@@ -181,7 +179,7 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
         console.print(f"note: {note}")
 
 
-def _print_figures(found: Identification) -> None:
+def _print_figures(found: "Identification") -> None:
     """Print the figures of each valve, and what each adds to the log odds of friction."""
     from stiction_ros.identification.judgement.figures import definitions
     from stiction_ros.identification.judgement.probability import contributions
@@ -206,7 +204,7 @@ def _print_figures(found: Identification) -> None:
         console.print(table)
 
 
-def _further(found: Identification) -> dict[str, str]:
+def _further(found: "Identification") -> dict[str, str]:
     """Return the heads of the columns of the law's further parameters, by their keys."""
     from stiction_ros.identification.friction.grid import find_law
 
@@ -218,7 +216,7 @@ def _further(found: Identification) -> dict[str, str]:
     return heads
 
 
-def _cells(valve: ValveEstimate, key: str) -> tuple[str, str]:
+def _cells(valve: "ValveEstimate", key: str) -> tuple[str, str]:
     """Return value and interval of a further parameter; a constant of the law is held."""
     if key not in valve.further:
         return "", ""

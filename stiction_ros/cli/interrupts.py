@@ -1,7 +1,5 @@
 """Ctrl-C that does not break off what must not be: the compiler, while it holds its locks."""
 
-from __future__ import annotations
-
 import contextlib
 import signal
 import threading

@@ -1,7 +1,5 @@
 """``stiction listen``: the windows of all loops in the graph, in one process."""
 
-from __future__ import annotations
-
 import argparse
 import resource
 import sys

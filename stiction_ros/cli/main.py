@@ -1,7 +1,5 @@
 """The command ``stiction``."""
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import logging

@@ -1,7 +1,5 @@
 """Options of the commands that open a session with a control system."""
 
-from __future__ import annotations
-
 import argparse
 
 from stiction_ros.opcua.security import SECURITY, Credentials

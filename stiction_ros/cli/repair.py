@@ -1,7 +1,5 @@
 """``stiction repair``: finish or salvage a bag."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 from typing import Any

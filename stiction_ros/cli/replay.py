@@ -1,7 +1,5 @@
 """``stiction replay``: estimator and controller once more over a recorded bag, without ROS."""
 
-from __future__ import annotations
-
 import argparse
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     return 1 if found.match is Match.DIFFERENT else 0
 
 
-def _print(bag: str, found: Replay) -> None:
+def _print(bag: str, found: "Replay") -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -86,7 +84,7 @@ def _print(bag: str, found: Replay) -> None:
     console.print(last[found.match])
 
 
-def _valves(match: FitMatch) -> str:
+def _valves(match: "FitMatch") -> str:
     update = match.fit.update
     if update is None:
         return match.fit.failure

@@ -1,7 +1,5 @@
 """``stiction report``: the report of a bag."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

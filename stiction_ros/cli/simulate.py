@@ -1,7 +1,5 @@
 """``stiction simulate``: a loop model in closed loop under its own controller."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 import shlex

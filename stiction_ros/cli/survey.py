@@ -1,7 +1,5 @@
 """``stiction survey``: every loop of a plant, ranked by what to service first."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 import dataclasses

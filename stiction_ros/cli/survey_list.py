@@ -1,7 +1,5 @@
 """The list of a survey on the console."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -21,7 +19,7 @@ ALWAYS, CAUSE = 3, 6  # columns that are always there, and the first that is bro
 APART = 2  # blanks between two columns
 
 
-def print_list(found: Survey, earlier: Sequence[Earlier]) -> None:
+def print_list(found: "Survey", earlier: "Sequence[Earlier]") -> None:
     """Print the first rows, in the words of the page; ``earlier`` surveys begin with the oldest."""
     from stiction_ros.survey.listing.headline import changed, headline, worked
     from stiction_ros.survey.pages.words import period
@@ -43,7 +41,7 @@ def print_list(found: Survey, earlier: Sequence[Earlier]) -> None:
     console.print(worked(found))
 
 
-def _table(entries: Sequence[Entry], width: int) -> Table:
+def _table(entries: "Sequence[Entry]", width: int) -> Table:
     """Return the columns that fit, the most telling first; no word of them is broken."""
     from stiction_ros.survey.listing.headline import kind_of
     from stiction_ros.survey.listing.saved import HEADS, in_words

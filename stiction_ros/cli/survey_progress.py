@@ -1,7 +1,5 @@
 """How far a survey is and how long the rest takes: loops that are done, of all that there are."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
 import threading
@@ -58,7 +56,7 @@ class Forecast:
         self._show, self._total, self._clock = show, total, clock
         self._begun = clock()
 
-    def __call__(self, reached: Reached) -> None:
+    def __call__(self, reached: "Reached") -> None:
         """Tell of a loop that is done."""
         total, here = self._total(), reached.done - reached.before
         if total is None:

@@ -1,7 +1,5 @@
 """``stiction valve-test``: a test of a valve in manual, planned and judged."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 from collections.abc import Sequence
@@ -74,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _limits(options: argparse.Namespace) -> Limits:
+def _limits(options: argparse.Namespace) -> "Limits":
     from stiction_ros.identification.valve_test.facts import Limits
 
     for name in ("op_limit", "pv_limit"):
@@ -86,7 +84,7 @@ def _limits(options: argparse.Namespace) -> Limits:
     return Limits(options.op_limit, options.pv_limit)
 
 
-def _before(record: Record, limits: Limits) -> Facts:
+def _before(record: "Record", limits: "Limits") -> "Facts":
     """Return what a record of the loop as it runs tells."""
     from stiction_ros.identification import identify
     from stiction_ros.identification.valve_test.facts import facts_before
@@ -96,7 +94,7 @@ def _before(record: Record, limits: Limits) -> Facts:
     return facts_before(record, found, limits)
 
 
-def _write(plan: Plan | None, target: str | None, made: Sequence[float] = ()) -> None:
+def _write(plan: "Plan | None", target: str | None, made: Sequence[float] = ()) -> None:
     """Write the moves of a round behind those that were made: a test is one record."""
     if target is None or plan is None:
         return
@@ -108,7 +106,7 @@ def _write(plan: Plan | None, target: str | None, made: Sequence[float] = ()) ->
         )
 
 
-def _show(plan: Plan, before: str | None) -> None:
+def _show(plan: "Plan", before: str | None) -> None:
     """Print a round as a procedure that an operator follows by hand."""
     facts, hold = plan.facts, spoken(plan.facts.hold)
     low, high = facts.pv_limit
@@ -130,7 +128,7 @@ def _show(plan: Plan, before: str | None) -> None:
     print(f"Then, with TEST the file that was recorded: {NEXT}{told}")
 
 
-def _told(judgement: Judgement, plan: Plan | None, options: argparse.Namespace) -> None:
+def _told(judgement: "Judgement", plan: "Plan | None", options: argparse.Namespace) -> None:
     """Print the verdict, and the next round where it is still open."""
     print(judgement.sentence)
     if plan is not None:

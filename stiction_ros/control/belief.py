@@ -1,7 +1,5 @@
 """Where the controller believes the stem of a sticky valve to be, and how surely."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.control.jump_form import FrictionSpread, JumpForm

@@ -1,7 +1,5 @@
 """What a controller believes of all valves of its loop."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lower bounds of small convex quadratic problems in boxes, compiled."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

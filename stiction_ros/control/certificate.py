@@ -1,7 +1,5 @@
 """How far a plan of the embedding is from the best that any pattern of jumps can do."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from collections.abc import Sequence
@@ -41,7 +39,7 @@ class Certificate:
     nodes: int  # of the search tree
 
 
-def certify(problem: FreeJumps, state: FloatArray, target: Target, plan: Plan) -> Certificate:
+def certify(problem: "FreeJumps", state: FloatArray, target: Target, plan: Plan) -> Certificate:
     """Return how far ``plan``, made at ``state`` and ``target``, is from the optimum."""
     nan = float("nan")
     if not problem.bounded:

@@ -1,7 +1,5 @@
 """One controller: observer, target, formulation, and the valves that it believes in."""
 
-from __future__ import annotations
-
 import functools
 import time
 from collections.abc import Sequence

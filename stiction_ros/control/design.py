@@ -1,7 +1,5 @@
 """What a controller is built from, and the past that it can take over."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 
@@ -42,7 +40,7 @@ class ControlDesign:
     # formulation and of the friction of each valve, None for a healthy one; None for these
     others: OtherFormulation | None = None
 
-    def without_rates(self) -> ControlDesign:
+    def without_rates(self) -> "ControlDesign":
         """Return the design without rate limits, for a controller that moves nothing."""
         free = np.full_like(self.limits.move, np.inf)
         return dataclasses.replace(self, limits=dataclasses.replace(self.limits, move=free))

@@ -1,7 +1,5 @@
 """Stiction-embedding MPC by exact enumeration of the moves that a sticky valve can make."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Sequence

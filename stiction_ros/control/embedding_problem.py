@@ -1,7 +1,5 @@
 """One quadratic programme of the exact embedding: the sticky valves move by given patterns."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a controller asks of a formulation, whichever it is."""
 
-from __future__ import annotations
-
 import abc
 
 from stiction_ros.control.beliefs import ValveBeliefs

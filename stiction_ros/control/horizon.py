@@ -1,7 +1,5 @@
 """The finite-horizon problem (19), condensed to the stem moves."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

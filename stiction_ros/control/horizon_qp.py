@@ -1,7 +1,5 @@
 """The condensed problem (19) for one pattern of moves, solved by daqp."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 

@@ -1,7 +1,5 @@
 """Stiction inversion: a linear MPC plans the stem, the inverse of the law turns it into OP."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

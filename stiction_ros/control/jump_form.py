@@ -1,7 +1,5 @@
 """What a controller asks of a law of stiction: its moves between two rests, or a refusal."""
 
-from __future__ import annotations
-
 from stiction_ros.effects import Behaviour, behaviours
 from stiction_ros.effects.friction.stiction import FrictionSpread, JumpForm, Stiction
 from stiction_ros.errors import InputError

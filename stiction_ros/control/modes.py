@@ -1,7 +1,5 @@
 """Which formulation a mode stands for."""
 
-from __future__ import annotations
-
 import math
 
 from stiction_ros.control.beliefs import ValveBeliefs

@@ -1,7 +1,5 @@
 """State and output-disturbance estimation for offset-free control."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import enum
@@ -77,7 +75,7 @@ class Observer:
         self.state = np.asarray(steady, dtype=float)
         self.disturbance = pv - model.pv0 - model.c @ self.state
 
-    def copy(self) -> Observer:
+    def copy(self) -> "Observer":
         """Return an observer of its own with the same estimates."""
         other = copy.copy(self)  # every array is replaced, never changed
         other._gate = copy.copy(self._gate)

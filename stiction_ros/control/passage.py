@@ -1,7 +1,5 @@
 """Whether the disturbance estimate is on its way, so that a jump had better wait for its end."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray

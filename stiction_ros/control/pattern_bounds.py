@@ -1,7 +1,5 @@
 """What each pattern of jumps costs at least, so that few of their programmes need be solved."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

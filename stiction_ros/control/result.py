@@ -1,7 +1,5 @@
 """What a control step returns: always a value, never an exception, never an invalid OP."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 

@@ -1,7 +1,5 @@
 """Did the valve move? A parallel observer that assumes it did not."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.control.belief import ValveBelief

@@ -10,8 +10,6 @@
 The mode is ``hold`` in the last two.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The steady-state target: where outputs and stems should come to rest."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import daqp

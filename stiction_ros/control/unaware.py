@@ -1,7 +1,5 @@
 """Stiction-unaware MPC, equation (19): the stem is taken to follow OP."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.control.formulation import Formulation

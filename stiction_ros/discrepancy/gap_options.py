@@ -1,7 +1,5 @@
 """What the user may choose."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.errors import InputError

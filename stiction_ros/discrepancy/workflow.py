@@ -1,7 +1,5 @@
 """The workflow: the data judged, effects looked for one by one, wholes compared, the answer."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 

@@ -9,8 +9,6 @@ Examples:
     (3.0, 'he')
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

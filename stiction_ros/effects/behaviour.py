@@ -1,7 +1,5 @@
 """What every effect is: a frozen dataclass with parameters, units and bounds, in its own file."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from abc import ABC, abstractmethod
@@ -212,7 +210,7 @@ class Behaviour(ABC):
         rows = zip(grid.tolist(), starts(start, len(grid)).tolist(), strict=True)
         return np.stack([cls(*row).simulate(values, at, sample_time) for row, at in rows], axis=1)
 
-    def filter(self, sample_time: float) -> Filter | None:
+    def filter(self, sample_time: float) -> "Filter | None":
         """Return the filter of samples ``sample_time`` s apart; None if not linear, or changing."""
         return None
 

@@ -1,7 +1,5 @@
 """Delays in whole and broken samples: of the process, and of a signal in its record."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

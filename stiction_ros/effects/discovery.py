@@ -4,8 +4,6 @@ The folders are those of this package, one per place, and those that ``STICTION_
 entry points name modules in the group ``stiction_ros.effects``.
 """
 
-from __future__ import annotations
-
 import functools
 import importlib
 import inspect

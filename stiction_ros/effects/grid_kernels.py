@@ -4,8 +4,6 @@ Every function takes the incoming signal, shape (N,), and one figure per point o
 where it rests, both of shape (G,); it returns outputs of shape (N, G).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.compiled import compiled

@@ -1,7 +1,5 @@
 """Ends that a signal cannot pass: of a valve's travel, and of a sensor's range."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

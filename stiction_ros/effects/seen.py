@@ -1,7 +1,5 @@
 """What a search for an effect is told of the signal, and what it says is to be searched."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

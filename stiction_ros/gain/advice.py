@@ -1,7 +1,5 @@
 """Which option to try first, from the mapping of ``gain --json``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

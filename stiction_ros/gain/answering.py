@@ -14,8 +14,6 @@ the record is likeliest. w is a wave from outside, where one is believed: it kee
 without it f and g would ring at its period.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Iterator
@@ -88,7 +86,7 @@ class Answering:
     @classmethod
     def of(
         cls, pv: FloatArray, stems: FloatArray, dead_times: IntArray, frequencies: FloatArray
-    ) -> Answering:
+    ) -> "Answering":
         """Choose prior and wave for the likeliest stems.
 
         Args:
@@ -141,13 +139,13 @@ class Answering:
         out[:first] = 0.0
         return out
 
-    def _products(self, stems: FloatArray) -> _Products:
+    def _products(self, stems: FloatArray) -> "_Products":
         past, orders, seen = self.past, (self.lags, self.lags), self.pv[self.past :]
         columns = arx_columns(self.pv, stems.T, self.delay.tolist(), orders, past)
         table = np.column_stack([*columns, np.ones(len(seen)), self.wave[past:]])
         return _Products(table.T @ table, table.T @ seen, float(seen @ seen), len(seen))
 
-    def _tuned(self, stems: FloatArray) -> tuple[float, Answering]:
+    def _tuned(self, stems: FloatArray) -> "tuple[float, Answering]":
         """Return −2 log of the likelihood of the best prior, downhill, and that prior in use."""
         products = self._products(stems)
         met: dict[Prior, float] = {}
@@ -162,7 +160,7 @@ class Answering:
             prior = better
         return loss(prior), dataclasses.replace(self, prior=prior)
 
-    def _solved(self, products: _Products, prior: Prior) -> tuple[float, Answer]:
+    def _solved(self, products: "_Products", prior: Prior) -> tuple[float, Answer]:
         """Return −2 log of the marginal likelihood, up to a constant, and the equation."""
         n, valves = self.lags, len(self.delay)
         precision, determinant = products.gram.copy(), 0.0

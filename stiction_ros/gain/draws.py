@@ -1,7 +1,5 @@
 """Loops that the identification does not tell apart: friction, controller, process drawn anew."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Self
 

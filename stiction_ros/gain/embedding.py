@@ -18,8 +18,6 @@ the jump of the stem, which a record tells worse than the band: so their frictio
 possible.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 
@@ -66,7 +64,7 @@ class EmbeddingDesign:
     spread: FrictionSpread | None  # half-widths of their intervals; None where they are known
 
     @classmethod
-    def of(cls, loop: RecordedLoop) -> EmbeddingDesign:
+    def of(cls, loop: RecordedLoop) -> "EmbeddingDesign":
         """Return the design by the rule for a recorded loop, scaled.
 
         Raises:
@@ -114,7 +112,7 @@ class EmbeddingDesign:
         friction: Behaviour,
         spread: FrictionSpread | None,
         variances: tuple[float, float],
-    ) -> EmbeddingDesign:
+    ) -> "EmbeddingDesign":
         """Return the design by the rule; every unit is that of the model.
 
         Args:

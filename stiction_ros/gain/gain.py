@@ -1,7 +1,5 @@
 """What would help one loop, with the uncertainty of the identification carried through."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from collections.abc import Sequence
@@ -77,7 +75,7 @@ class Option:
     # weights of the embedding, factors of the retuning
     settings: dict[str, float] = dataclasses.field(default_factory=dict)
 
-    def beside(self, now: Measures, left: Measures) -> Option:
+    def beside(self, now: Measures, left: Measures) -> "Option":
         """Return the option with measures in the ratio to what is recorded.
 
         What the identified loop does otherwise than the recorded one is in the simulation of
@@ -96,7 +94,7 @@ class Option:
         }
         return dataclasses.replace(self, measures=Measures(**measures), interval=interval)
 
-    def where_agreed(self, now: Measures) -> Option:
+    def where_agreed(self, now: Measures) -> "Option":
         """Return the option, without figures where they would not hold in each drawn loop.
 
         The note says on which measure the loops do not agree, and on which they do.

@@ -6,8 +6,6 @@
 - *Travel*, *moves* and *reversals* of the stem, an hour: :mod:`stiction_ros.records.valve_work`.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """What would help the loop of a loop model, simulated under its own controller as baseline."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 
@@ -64,7 +62,7 @@ class ModelLoop:
     @classmethod
     def of(
         cls, model: LoopModel, set_points: SetPoints | None = None, samples: int = SAMPLES
-    ) -> ModelLoop:
+    ) -> "ModelLoop":
         """Return the loop of a model.
 
         Args:

@@ -8,8 +8,6 @@ Signals are in units of their own movement, see
 :mod:`stiction_ros.identification.closed_loop.scaled_loop`.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -87,7 +85,7 @@ class RecordedLoop:
     yardstick: Yardstick  # measures of a run
 
     @classmethod
-    def of(cls, record: Record, found: Identification, valve: str | None = None) -> RecordedLoop:
+    def of(cls, record: Record, found: Identification, valve: str | None = None) -> "RecordedLoop":
         """Return the loop of a valve; of the one with the widest band when none is named.
 
         Raises:
@@ -170,7 +168,7 @@ class RecordedLoop:
         stem = self.loop.stem[rows, self.valve]
         return self.yardstick.measure(self.pv_scale * error, self.op_scale * stem)
 
-    def last(self, samples: int, past: int) -> RecordedLoop:
+    def last(self, samples: int, past: int) -> "RecordedLoop":
         """Return the loop with no more than its last ``samples`` rows.
 
         Args:

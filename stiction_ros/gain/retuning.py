@@ -5,8 +5,6 @@ without friction keeps its distance from instability, and it is chosen for the l
 some of the loops that the identification does not tell apart. It must not make the cycle wider.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Callable, Mapping, Sequence

@@ -14,8 +14,6 @@ answer up to that of :math:`C' P`. Of :math:`C'` one sample is, with the observe
     \chi &= \chi_{ss} - K_z (\hat\xi^+ - \xi_{ss}) - K_v (\chi^- - \chi_{ss}).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.control.design import ControlDesign

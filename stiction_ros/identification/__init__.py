@@ -1,7 +1,5 @@
 """Friction of valves and dynamics of processes from recorded OP and PV."""
 
-from __future__ import annotations
-
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.methods import METHODS, identify
 from stiction_ros.identification.result.identification import (

@@ -1,7 +1,5 @@
 """The end of a search, compiled by another process while this one compiles its beginning."""
 
-from __future__ import annotations
-
 import atexit
 import functools
 import logging

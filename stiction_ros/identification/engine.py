@@ -1,7 +1,5 @@
 """From a record to valves, outputs and verdicts: the order of the work."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What a caller may choose, and the constants behind the verdict."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -6,8 +6,6 @@
   pattern, :mod:`.engine`. It takes the process at its word, and is several times as fast.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping
 from functools import partial

@@ -4,8 +4,6 @@ The compiled loops let other threads run, so two threads share most of the work.
 back does not depend on how many there are: every part is computed as it would be alone.
 """
 
-from __future__ import annotations
-
 import collections
 import functools
 import multiprocessing

@@ -1,7 +1,5 @@
 """Everything that is compiled, compiled before it is needed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

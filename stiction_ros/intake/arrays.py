@@ -1,7 +1,5 @@
 """Records from arrays and data frames, read as the columns of a file are."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import re

@@ -1,7 +1,5 @@
 """The records of one loop from its blocks."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import partial

@@ -3,8 +3,6 @@
 Each block by itself, as in joined ones the two passes over an hour are one.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Sequence
@@ -80,7 +78,7 @@ class _Rows:
     rank: NDArray[np.int64]
 
     @classmethod
-    def of(cls, *blocks: Block) -> _Rows:
+    def of(cls, *blocks: Block) -> "_Rows":
         """Return the rows of blocks of one file, which may stand from the last to the first."""
         lines = [b.lines if b.lines[0] <= b.lines[-1] else -b.lines for b in blocks]
         wall, rank = np.concatenate([b.clock.start + b.time for b in blocks]), np.concatenate(lines)

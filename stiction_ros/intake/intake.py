@@ -1,7 +1,5 @@
 """From paths to loops."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import os

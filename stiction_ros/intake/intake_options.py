@@ -1,7 +1,5 @@
 """What a user may say about exports; everything has a default."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from collections.abc import Mapping

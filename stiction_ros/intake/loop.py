@@ -1,7 +1,5 @@
 """One loop of a plant, as it was found in exports."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path

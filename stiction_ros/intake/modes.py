@@ -1,7 +1,5 @@
 """Which samples a loop was not in automatic, by its column MODE."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 import shlex

@@ -1,7 +1,5 @@
 """What OP is counted in, and whether PV and OP may have been swapped."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import shlex

@@ -1,7 +1,5 @@
 """The longest good record of one export or bag."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 What is missing is held (OP, SP) or interpolated (PV) for up to :data:`HELD` samples, else bad.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections import Counter

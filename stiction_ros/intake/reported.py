@@ -3,8 +3,6 @@
 OP, SP and modes hold until the next report; PV goes straight from report to report.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """What stands in the columns of a loop, for people who check whether they are the right ones."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple

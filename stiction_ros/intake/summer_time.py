@@ -1,7 +1,5 @@
 """When local clocks are set forward and back, by the calendars of the zone database."""
 
-from __future__ import annotations
-
 import functools
 import zoneinfo
 from datetime import UTC, datetime, timedelta

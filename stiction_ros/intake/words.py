@@ -1,7 +1,5 @@
 """The words of exports, as ``words.yaml`` beside this file lists them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from importlib import resources

@@ -1,7 +1,5 @@
 """A whole closed loop as one function: no ROS, seeded, repeatable bit for bit."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Protocol

@@ -1,7 +1,5 @@
 """How a loop without friction rings: the poles of controller and process together."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

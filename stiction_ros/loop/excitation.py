@@ -1,7 +1,5 @@
 """Open-loop experiments: random binary moves of the valves, and what the plant answers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects import FloatArray

@@ -3,8 +3,6 @@
 A valve without a controller keeps its OP.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -41,7 +39,7 @@ class Controllers(NamedTuple):
     high: FloatArray
 
     @classmethod
-    def of(cls, pairs: Pairs) -> Controllers:
+    def of(cls, pairs: Pairs) -> "Controllers":
         """Return controllers as they were recovered, each with the output that it reads."""
         outputs, laws = zip(*pairs, strict=True)
         low, high = np.array([law.limits for law in laws]).T.copy()

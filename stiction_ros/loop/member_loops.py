@@ -1,7 +1,5 @@
 """Loops that share one plant: which tags are whose, and how a cascade hangs together."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Sequence

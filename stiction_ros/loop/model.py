@@ -1,7 +1,5 @@
 """LoopModel: all that is known of one loop, as YAML holds it."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -98,7 +96,7 @@ class LoopModel:
         )
 
     @classmethod
-    def load(cls, path: Path | str) -> LoopModel:
+    def load(cls, path: Path | str) -> "LoopModel":
         """Read a ``*.loop.yaml`` file; anything wrong in it raises InputError.
 
         Args:
@@ -107,7 +105,7 @@ class LoopModel:
         return cls.from_mapping(load_yaml(path), str(path))
 
     @classmethod
-    def from_yaml(cls, text: str, where: str = "loop model") -> LoopModel:
+    def from_yaml(cls, text: str, where: str = "loop model") -> "LoopModel":
         """Read YAML text, as the topic ``loop_model`` carries it.
 
         Args:
@@ -117,7 +115,7 @@ class LoopModel:
         return cls.from_mapping(parse_yaml(text, where), where)
 
     @classmethod
-    def from_mapping(cls, document: Any, where: str = "loop model") -> LoopModel:
+    def from_mapping(cls, document: Any, where: str = "loop model") -> "LoopModel":
         """Check a YAML mapping and build the loop from it.
 
         Args:
@@ -183,7 +181,7 @@ class LoopModel:
         dead_time: float = 0.0,
         name: str = "loop",
         **sections: Any,
-    ) -> LoopModel:
+    ) -> "LoopModel":
         """Return the loop of a linear process behind ideal valves V1, V2, … of 0 to 100 %.
 
         Args:
@@ -258,7 +256,7 @@ class LoopModel:
 
     def with_valve_effects(
         self, effects: Mapping[str, Sequence[Behaviour]], **provenance: Any
-    ) -> LoopModel:
+    ) -> "LoopModel":
         """Return the loop with the effects of the named valves replaced.
 
         Args:
@@ -281,7 +279,7 @@ class LoopModel:
             document.setdefault("provenance", []).append(dict(provenance))
         return LoopModel.from_mapping(document, self.name)
 
-    def with_effect(self, place: str, effect: Behaviour, **provenance: Any) -> LoopModel:
+    def with_effect(self, place: str, effect: Behaviour, **provenance: Any) -> "LoopModel":
         """Return the loop with one more effect, the last in signal order at its place.
 
         Args:
@@ -299,7 +297,7 @@ class LoopModel:
             document.setdefault("provenance", []).append(dict(provenance))
         return LoopModel.from_mapping(document, self.name)
 
-    def with_ideal_valves(self) -> LoopModel:
+    def with_ideal_valves(self) -> "LoopModel":
         """Return the loop with valves that follow OP exactly."""
         return self.with_valve_effects(dict.fromkeys(self.valve_names, ()))
 

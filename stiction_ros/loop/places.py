@@ -1,7 +1,5 @@
 """Where an effect acts, and how the YAML of a loop model says so."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from stiction_ros.effects import Behaviour

@@ -1,7 +1,5 @@
 """The simulated plant: a loop model that moves one sample at a time."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

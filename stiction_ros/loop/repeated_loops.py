@@ -8,8 +8,6 @@ Every OP follows from its controller, which may be of any kind. Every stem follo
 its valve, which may be any law.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

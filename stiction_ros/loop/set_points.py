@@ -1,7 +1,5 @@
 """A schedule of set-points, held between its moves and repeated when asked."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from pathlib import Path
@@ -38,7 +36,7 @@ class SetPoints:
     repeat: float = np.inf
 
     @classmethod
-    def from_mapping(cls, value: Any, outputs: tuple[str, ...], where: str) -> SetPoints:
+    def from_mapping(cls, value: Any, outputs: tuple[str, ...], where: str) -> "SetPoints":
         """Read ``{repeat: s, moves: [{time: s, TAG: value, …}, …]}``; the first sets every tag.
 
         Args:
@@ -71,7 +69,7 @@ class SetPoints:
         return cls(outputs, np.array(times), np.array(rows, dtype=float), repeat)
 
     @classmethod
-    def load(cls, path: Path | str, outputs: tuple[str, ...]) -> SetPoints:
+    def load(cls, path: Path | str, outputs: tuple[str, ...]) -> "SetPoints":
         """Read the schedule from a YAML file.
 
         Args:

@@ -1,7 +1,5 @@
 """The process of a loop model from a system of SciPy or python-control, or from arrays."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Valves that change in mid-run: serviced, worn, replaced."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

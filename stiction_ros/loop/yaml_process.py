@@ -1,7 +1,5 @@
 """The ``process`` section of a loop model, and what its instruments can show."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

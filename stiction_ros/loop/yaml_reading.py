@@ -1,7 +1,5 @@
 """Checked reading of YAML: every wrong key, type or number becomes one clear error."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterator, Mapping
@@ -162,11 +160,11 @@ class Section:
             out.append([number(v, f"{self.at(key)}[{i}]") for v in row])
         return np.array(out)
 
-    def section(self, key: str, default: Any = _REQUIRED) -> Section:
+    def section(self, key: str, default: Any = _REQUIRED) -> "Section":
         """Return the mapping below ``key``."""
         return Section(self.raw(key, default), self.at(key))
 
-    def sections(self, key: str, default: Any = _REQUIRED) -> Iterator[Section]:
+    def sections(self, key: str, default: Any = _REQUIRED) -> "Iterator[Section]":
         """Yield the mappings of the list below ``key``."""
         value = self.raw(key, default)
         if not isinstance(value, list | tuple):

@@ -1,7 +1,5 @@
 """Start one node: ``python -m stiction_ros.nodes plant --ros-args -p pace:=lockstep``."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """The controller: pv and sp in, op out; swaps to what the estimator finds."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from typing import Any

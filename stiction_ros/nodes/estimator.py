@@ -1,7 +1,5 @@
 """The estimator: pv and op in, friction and loop model out."""
 
-from __future__ import annotations
-
 import time
 from collections import Counter, deque
 from concurrent.futures import Future

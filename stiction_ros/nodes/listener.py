@@ -1,7 +1,5 @@
 """One process that fills the windows of all loops in the graph, without a node for each."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

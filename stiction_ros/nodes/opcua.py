@@ -1,7 +1,5 @@
 """The driver of a real plant: tags of a control system to topics, and OP back under its grant."""
 
-from __future__ import annotations
-
 import functools
 import random
 import time

@@ -1,7 +1,5 @@
 """The topics and the status of one bridged loop."""
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Sequence
 

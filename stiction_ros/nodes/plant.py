@@ -1,7 +1,5 @@
 """The simulated plant: publishes pv (and sp), holds op, and owns the simulated time."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import time

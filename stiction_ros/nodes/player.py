@@ -1,7 +1,5 @@
 """The player: a bag back into the graph, at any rate, with pause and steps."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from rclpy.clock import Clock as RosClock

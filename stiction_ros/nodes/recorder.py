@@ -1,7 +1,5 @@
 """The recorder: every topic of the graph into one MCAP bag."""
 
-from __future__ import annotations
-
 import itertools
 import struct
 import time

@@ -1,7 +1,5 @@
 """What a node has noticed, shown long enough to be seen and no longer than it lasts."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Windows of many loops in one place, filled sample by sample without a node for each."""
 
-from __future__ import annotations
-
 from collections import Counter, deque
 from collections.abc import Sequence
 

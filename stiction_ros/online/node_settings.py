@@ -1,7 +1,5 @@
 """The parameters of controller and estimator, as parameter files and ``ros2 param`` know them."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.online.controller.settings import LiveControllerSettings

@@ -1,7 +1,5 @@
 """Brings PV and OP of one sample together, whatever order they come in and whatever lacks."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import Counter, deque
 

@@ -3,8 +3,6 @@
 They stand apart so that these nodes load nothing of control and identification.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

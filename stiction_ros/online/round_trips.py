@@ -1,7 +1,5 @@
 """How long the loop takes to answer: wall time from a PV to the OP of its sample."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

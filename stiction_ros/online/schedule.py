@@ -1,7 +1,5 @@
 """When the estimator fits a window, and when its result takes effect."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.errors import InputError

@@ -4,8 +4,6 @@ The nodes do the same through topics; with the same settings and seed both give 
 numbers.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -102,7 +100,7 @@ class SimulatedPlant:
     samples: int
     valve_changes: tuple[ValveChange, ...]
 
-    def with_ideal_valves(self) -> SimulatedPlant:
+    def with_ideal_valves(self) -> "SimulatedPlant":
         """Return the same plant with valves that follow OP exactly, to the end."""
         return dataclasses.replace(self, model=self.model.with_ideal_valves(), valve_changes=())
 
@@ -193,7 +191,7 @@ class Scenario:
         )
 
     @classmethod
-    def load(cls, path: Path | str) -> Scenario:
+    def load(cls, path: Path | str) -> "Scenario":
         """Read a ROS parameter file (``node: {ros__parameters: {…}}``).
 
         File names in it are relative to the file itself. ``valve_changes`` may be a list, which
@@ -212,7 +210,7 @@ class Scenario:
     @classmethod
     def of(
         cls, name: str, path: Path, nodes: Mapping[str, Mapping[str, Any]], plant: SimulatedPlant
-    ) -> Scenario:
+    ) -> "Scenario":
         """Return the scenario of one loop from what its nodes are told.
 
         Args:

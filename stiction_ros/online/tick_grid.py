@@ -1,7 +1,5 @@
 """When samples are due on the wall clock: a grid that a late tick begins anew."""
 
-from __future__ import annotations
-
 LATE = 0.5  # of a period: a tick that is later would come too close to the next
 
 

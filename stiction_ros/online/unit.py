@@ -5,8 +5,6 @@ an inner one. The nodes do the same through topics, each loop in a namespace; wi
 settings and seed both give the same numbers.
 """
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -58,7 +56,7 @@ class UnitScenario:
     members: Mapping[str, Scenario]
 
     @classmethod
-    def load(cls, path: Path | str) -> UnitScenario:
+    def load(cls, path: Path | str) -> "UnitScenario":
         """Read a ROS parameter file whose plant has ``loops``.
 
         What stands under ``/**/controller`` is for the controllers of all loops, what stands under

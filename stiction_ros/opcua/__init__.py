@@ -3,8 +3,6 @@
 :mod:`.plant_link` alone knows the network; ``asyncua`` comes with the extra ``opcua``.
 """
 
-from __future__ import annotations
-
 import importlib.util
 
 from stiction_ros.errors import InputError

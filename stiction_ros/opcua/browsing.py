@@ -1,7 +1,5 @@
 """A tag map made by browsing a server: loops are what has a PV and an OP under one name."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -30,7 +28,7 @@ async def browse(url: str, credentials: Credentials, root: str) -> dict[tuple[st
         await client.disconnect()
 
 
-async def _browse(client: Client, root: str) -> dict[tuple[str, str], str]:
+async def _browse(client: "Client", root: str) -> dict[tuple[str, str], str]:
     from asyncua import ua
 
     spaces = await client.get_namespace_array()
@@ -60,7 +58,7 @@ async def _browse(client: Client, root: str) -> dict[tuple[str, str], str]:
     return found
 
 
-def url_of(client: Client) -> str:
+def url_of(client: "Client") -> str:
     """Return the address of a client without anything secret."""
     return str(client.server_url.geturl())
 

@@ -1,7 +1,5 @@
 """Who may write: a grant that is asked for, given by the plant, and lost at the first doubt."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 
@@ -47,19 +45,19 @@ class Grant:
         """Whether an OP may be written."""
         return self.state is GrantState.GRANTED
 
-    def ask(self) -> Grant:
+    def ask(self) -> "Grant":
         """Want the grant; nothing changes where nothing is ever written."""
         if self.state is not GrantState.IDLE:
             return self
         return dataclasses.replace(self, wanted=True, lost=False)
 
-    def give_back(self, now: float, reason: str) -> Grant:
+    def give_back(self, now: float, reason: str) -> "Grant":
         """Return to idle, and stay there until it is asked for again."""
         if self.state is GrantState.LISTENING:
             return self
         return Grant(GrantState.IDLE, now, reason, lost=self.requesting)
 
-    def follow(self, facts: Facts) -> Grant:
+    def follow(self, facts: Facts) -> "Grant":
         """Return what becomes of it.
 
         - idle and wanted: asked, once nothing speaks against it and nobody else asks.

@@ -1,7 +1,5 @@
 """Beats that tell who lives: ours with our number in them, theirs, and those of strangers."""
 
-from __future__ import annotations
-
 IDENTITIES = 1 << 15  # numbers of writers
 COUNT = 1 << 16  # beats until the count begins anew
 

@@ -1,7 +1,5 @@
 """History of tags (OPC UA part 11, raw values): read in pages, resumed, made into records."""
 
-from __future__ import annotations
-
 import asyncio
 import dataclasses
 import datetime
@@ -173,7 +171,7 @@ async def fetch(
         await asyncio.wait_for(client.disconnect(), ANSWER)
 
 
-async def _fetch_tag(client: Client, node: ua.NodeId, file: HistoryFile, span: Span) -> None:
+async def _fetch_tag(client: "Client", node: "ua.NodeId", file: HistoryFile, span: Span) -> None:
     """Read page after page, by the server's continuation points or by the stamps."""
     from asyncua import ua
 

@@ -1,7 +1,5 @@
 """One loop between its tags and its topics: what goes out, what may be written, and why."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import Counter
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """What of a wanted OP may be written, within limits and rate, and what the rate has cut of it."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import deque
 from collections.abc import Sequence

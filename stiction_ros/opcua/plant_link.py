@@ -1,7 +1,5 @@
 """The network side: one OPC UA session in a thread of its own, subscribed, and reconnected."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import dataclasses
@@ -170,7 +168,7 @@ class PlantLink:
             with contextlib.suppress(OSError, TimeoutError, ua.UaError):
                 await asyncio.wait_for(client.disconnect(), ANSWER)
 
-    async def _session(self, client: Client) -> str:
+    async def _session(self, client: "Client") -> str:
         tags = ServerTags(client, self.settings.tags, self.settings.written)
         await tags.find()
         self._forget_orders()
@@ -215,7 +213,7 @@ class PlantLink:
         """How often the server looks at a tag, ms."""
         return 500.0 * self.settings.publishing
 
-    async def _subscribe(self, client: Client) -> Any:
+    async def _subscribe(self, client: "Client") -> Any:
         from asyncua import ua
 
         interval = 1000.0 * self.settings.publishing
@@ -245,7 +243,7 @@ class PlantLink:
             self._wake()
         return "the subscription ended"
 
-    async def _watch(self, client: Client, subscription: Any) -> str:
+    async def _watch(self, client: "Client", subscription: Any) -> str:
         """Return when the session is lost, or the server says nothing any more."""
         from asyncua.client.ua_client import UaClientState
 
@@ -259,7 +257,7 @@ class PlantLink:
 
     # ---- writing ---------------------------------------------------------------------------
 
-    async def _write_orders(self, client: Client, tags: ServerTags) -> str:
+    async def _write_orders(self, client: "Client", tags: ServerTags) -> str:
         while True:
             order = await self._orders.get()
             begin = time.monotonic()

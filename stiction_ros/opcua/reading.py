@@ -1,7 +1,5 @@
 """What a control system says of one tag: a value, how good it is, and since when it holds."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import math

@@ -1,7 +1,5 @@
 """Changes of tags, paired to the samples of a loop by one written rule."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import Counter, deque
 

@@ -1,7 +1,5 @@
 """Certificates that are made and pinned, and secrets that nobody else can read."""
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 import ipaddress
@@ -33,7 +31,7 @@ class Credentials:
     password_file: str = ""  # file of the password
 
     @classmethod
-    def of(cls, given: object) -> Credentials:
+    def of(cls, given: object) -> "Credentials":
         """Return what settings, or options of a command, say under the same names."""
         return cls(*(getattr(given, field.name) for field in dataclasses.fields(cls)))
 
@@ -93,7 +91,7 @@ def check_secret_file(path: Path) -> None:
         )
 
 
-def load_certificate(path: Path) -> x509.Certificate:
+def load_certificate(path: Path) -> "x509.Certificate":
     """Return the certificate in a DER or PEM file."""
     from cryptography import x509
 
@@ -109,7 +107,7 @@ def load_certificate(path: Path) -> x509.Certificate:
         raise InputError("is no certificate", where=str(path)) from None
 
 
-def check_dates(certificate: x509.Certificate, where: str) -> None:
+def check_dates(certificate: "x509.Certificate", where: str) -> None:
     """Raise InputError when a certificate has expired or is not valid yet."""
     now = datetime.datetime.now(datetime.UTC)
     if now > certificate.not_valid_after_utc:
@@ -126,7 +124,7 @@ def check_dates(certificate: x509.Certificate, where: str) -> None:
         )
 
 
-def fingerprint(certificate: x509.Certificate) -> str:
+def fingerprint(certificate: "x509.Certificate") -> str:
     """Return the SHA-256 fingerprint as pairs of hexadecimal digits."""
     from cryptography.hazmat.primitives import hashes
 
@@ -194,7 +192,7 @@ def write_secret(path: Path, content: bytes) -> None:
         file.write(content)
 
 
-def _general_name(host: str) -> x509.GeneralName:
+def _general_name(host: str) -> "x509.GeneralName":
     from cryptography import x509
 
     try:
@@ -203,7 +201,7 @@ def _general_name(host: str) -> x509.GeneralName:
         return x509.DNSName(host)
 
 
-def _key_usage() -> x509.KeyUsage:
+def _key_usage() -> "x509.KeyUsage":
     from cryptography import x509
 
     return x509.KeyUsage(

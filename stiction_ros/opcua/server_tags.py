@@ -1,7 +1,5 @@
 """The tags of one session: which nodes they are, and which of them the server refuses, and why."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +30,7 @@ class ServerTags:
         unread, unwritten: why a tag is refused, for those that are.
     """
 
-    def __init__(self, client: Client, read: Sequence[str], written: Mapping[str, Use]) -> None:
+    def __init__(self, client: "Client", read: Sequence[str], written: Mapping[str, Use]) -> None:
         """Take the tags; :meth:`find` and :meth:`subscribe` ask the server."""
         self._client, self._read, self._written = client, read, written
         self._names: dict[ua.NodeId, list[str]] = {}
@@ -47,7 +45,7 @@ class ServerTags:
         """Copies of ``unread`` and ``unwritten``."""
         return dict(self.unread), dict(self.unwritten)
 
-    def of(self, node: ua.NodeId) -> list[str]:
+    def of(self, node: "ua.NodeId") -> list[str]:
         """Return the tags that are read from a node."""
         return self._names.get(node, [])
 

@@ -1,7 +1,5 @@
 """One session with a server: opened by credentials, read, written, its errors in words."""
 
-from __future__ import annotations
-
 import asyncio
 import datetime
 import logging
@@ -31,7 +29,7 @@ SAID = {
 EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 
 
-async def open_client(url: str, credentials: security.Credentials) -> Client:
+async def open_client(url: str, credentials: security.Credentials) -> "Client":
     """Return a client with an active session, as the credentials ask for.
 
     Raises:
@@ -67,7 +65,7 @@ async def open_client(url: str, credentials: security.Credentials) -> Client:
     return client
 
 
-def is_open(client: Client) -> bool:
+def is_open(client: "Client") -> bool:
     """Return whether the connection of a client stands."""
     from asyncua.client.ua_client import UASocketState
 
@@ -75,7 +73,7 @@ def is_open(client: Client) -> bool:
     return protocol is not None and protocol.state is not UASocketState.CLOSED
 
 
-async def shown_certificate(url: str) -> x509.Certificate | None:
+async def shown_certificate(url: str) -> "x509.Certificate | None":
     """Return what a server shows for signed and encrypted sessions; None where it has none."""
     from asyncua import Client, ua
     from asyncua.crypto.uacrypto import x509_from_der
@@ -106,7 +104,7 @@ async def _compare(url: str, pinned: Path) -> None:
         )
 
 
-async def _connect(client: Client) -> None:
+async def _connect(client: "Client") -> None:
     """Connect; a connection that the other side has closed is not waited for."""
     opening, closed = asyncio.create_task(client.connect()), 0
     try:
@@ -123,13 +121,13 @@ async def _connect(client: Client) -> None:
     opening.result()
 
 
-async def node_ids(client: Client, tags: Sequence[str]) -> dict[str, ua.NodeId]:
+async def node_ids(client: "Client", tags: Sequence[str]) -> "dict[str, ua.NodeId]":
     """Return the node id of each tag by :func:`node_id`."""
     spaces = await client.get_namespace_array()
     return {tag: node_id(tag, spaces) for tag in dict.fromkeys(tags)}
 
 
-def node_id(tag: str, spaces: Sequence[str]) -> ua.NodeId:
+def node_id(tag: str, spaces: Sequence[str]) -> "ua.NodeId":
     """Return the node id of a tag, ``nsu=URI;`` looked up in the server's namespaces.
 
     Raises:
@@ -149,7 +147,7 @@ def node_id(tag: str, spaces: Sequence[str]) -> ua.NodeId:
         raise InputError("is no node id", where=f"tag {tag}") from None
 
 
-def reading_of(value: ua.DataValue | None, first: bool) -> TagReading:
+def reading_of(value: "ua.DataValue | None", first: bool) -> TagReading:
     """Return what a data value says; the server's stamp serves where the source has none."""
     stamp = None if value is None else value.SourceTimestamp or value.ServerTimestamp
     if value is None or stamp is None:
@@ -180,16 +178,16 @@ def describe(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-async def kind_of(client: Client, node: ua.NodeId) -> ua.VariantType:
+async def kind_of(client: "Client", node: "ua.NodeId") -> "ua.VariantType":
     """Return the type of value that a node takes."""
     return await client.get_node(node).read_data_type_as_variant_type()
 
 
 async def write(
-    client: Client,
+    client: "Client",
     order: WriteOrder,
-    resolve: dict[str, ua.NodeId],
-    kinds: dict[str, ua.VariantType],
+    resolve: "dict[str, ua.NodeId]",
+    kinds: "dict[str, ua.VariantType]",
 ) -> str:
     """Write one order, if the modes still grant it; return why not, empty when it is written."""
     from asyncua import ua
@@ -221,7 +219,7 @@ async def write(
     return "" if bad is None else f"the server answers {bad.name}"
 
 
-def _as_kind(value: float, kind: ua.VariantType) -> bool | int | float:
+def _as_kind(value: float, kind: "ua.VariantType") -> bool | int | float:
     from asyncua import ua
 
     if kind is ua.VariantType.Boolean:

@@ -1,7 +1,5 @@
 """Which tags of a control system make up which loop: ``*.tags.yaml``."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import re
@@ -116,7 +114,7 @@ class TagMap:
     loops: tuple[LoopTags, ...]  # in the order of the file
 
     @classmethod
-    def load(cls, path: Path | str) -> TagMap:
+    def load(cls, path: Path | str) -> "TagMap":
         """Read a ``*.tags.yaml``; anything missing, unknown or written by two is an InputError."""
         top = Section(load_yaml(path), str(path))
         server = top.text("server") if "server" in top else ""

@@ -1,7 +1,5 @@
 """The frame of every page: one file with its style, and nothing that is fetched."""
 
-from __future__ import annotations
-
 import html
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Figures as SVG that take their colours from the page; those over time can be zoomed."""
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 import itertools

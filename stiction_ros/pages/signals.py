@@ -1,7 +1,5 @@
 """The signals of a record as figures: a close look, PV and stem against OP, and all of it."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 from collections.abc import Mapping
@@ -179,7 +177,7 @@ def _valve(record: Record, stem: FloatArray | None, j: int, rows: slice) -> list
     return curves
 
 
-def _planes(record: Record, stem: FloatArray | None, window: Window, units: Units) -> str:
+def _planes(record: Record, stem: FloatArray | None, window: "Window", units: Units) -> str:
     """Return PV and the stem of each valve against OP, side by side."""
     middle = (window.first + window.last) // 2
     first = max(min(middle - MOST // 2, len(record) - MOST), 0)
@@ -227,7 +225,7 @@ class Window:
     period: float | None  # of the cycle, s; None where there is none
 
     @classmethod
-    def of(cls, record: Record, found: Identification) -> Window:
+    def of(cls, record: Record, found: Identification) -> "Window":
         """Return four cycles from the middle of the longest good part.
 
         The valve is the one with the widest band, the output the one that oscillates with it.

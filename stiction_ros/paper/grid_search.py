@@ -5,8 +5,6 @@ smoothed law (5) at τ = 10⁴; for each choice of delays ARX is fitted by least
 mean SE (14) wins. Nothing is shared between points: this is the baseline.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import time

@@ -1,7 +1,5 @@
 """PaperIdentification by the paper's methods: ``nlp``, ``nlp_printed`` and ``grid``."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns

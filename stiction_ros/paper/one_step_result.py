@@ -1,7 +1,5 @@
 """What the paper's two methods share: checks, delays to try, and the result."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 
@@ -37,7 +35,7 @@ class Answer:
     delays: Delays  # t_d per output and valve, samples
     objective: float | None  # (12a) as the method has it; None for that of the hard law
     points: int  # frictions at which it was evaluated
-    found: EquationError | None = None  # models and stems; None for those of the hard law
+    found: "EquationError | None" = None  # models and stems; None for those of the hard law
     starts: tuple[SolvedStart, ...] = ()  # every run of a solver
 
 
@@ -73,7 +71,7 @@ def orders_of(record: Record, options: PaperOptions) -> ArxOrders:
 
 def evaluated(
     record: Record, options: PaperOptions, friction: FloatArray, delays: Delays
-) -> EquationError:
+) -> "EquationError":
     """Return (12a) at a friction, rows (f_S, f_D), (m, 2), %, under the hard law of the options."""
     stems = smooth_law(options.law).hard_stems(record.op, np.asarray(friction, dtype=float))
     return fit_outputs(record.pv, stems, delays, orders_of(record, options))

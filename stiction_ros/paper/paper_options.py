@@ -1,7 +1,5 @@
 """What a caller of the paper's methods may choose."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -58,7 +56,7 @@ class PaperOptions:
                 )
 
     @classmethod
-    def of(cls, options: IdentificationOptions, method: str, **chosen: object) -> PaperOptions:
+    def of(cls, options: IdentificationOptions, method: str, **chosen: object) -> "PaperOptions":
         """Return options of a method of the paper with the orders and delays of ``options``."""
         shared = {
             key: getattr(options, key)

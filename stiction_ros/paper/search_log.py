@@ -1,7 +1,5 @@
 """What a search tried and what its answer is worth, for reports and benchmarks."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

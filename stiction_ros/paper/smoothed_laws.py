@@ -5,8 +5,6 @@ r"""Friction laws that the paper's methods take: hard, and with switches of hype
 The first entry is the stem; Kano's law and XCH's carry the direction of motion besides, 0 at rest.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -4,8 +4,6 @@ A record is cut where a set-point moves, else into eight parts. Of each hold the
 Δu is the largest span that another one reaches by half: what comes once is a transient.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 

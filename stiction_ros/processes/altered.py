@@ -1,7 +1,5 @@
 """A process whose outputs pass further linear effects: gain, delay, pole, leak."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects import Behaviour, Filter, FloatArray

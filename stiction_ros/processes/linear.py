@@ -1,7 +1,5 @@
 """The discrete linear model in deviations that controllers and linear processes share."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 

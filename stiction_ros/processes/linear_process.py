@@ -1,7 +1,5 @@
 """Processes that are linear: ARX equations with delays, and state space."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """What every process is: stem positions in, process variables out, one sample at a time."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from abc import ABC, abstractmethod

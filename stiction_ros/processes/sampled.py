@@ -1,7 +1,5 @@
 """Transfer functions as difference equations of samples, stems held between them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """The continuous stirred tank mixer of Appendix A, equation (A.1) and Table A.3."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Writes a record as a CSV file that is read back, digit by digit."""
 
-from __future__ import annotations
-
 import csv
 import datetime
 import math

@@ -1,7 +1,5 @@
 """The parts of a record that has gaps: the only one, the longest good one, all in one."""
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """How good a sample of a record is."""
 
-from __future__ import annotations
-
 import enum
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One record of a loop: what everything that looks at data takes."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
@@ -120,7 +118,7 @@ class Record:
         outputs: Sequence[str] | None = None,
         op_unit: str | None = None,
         name: str = "record",
-    ) -> Record:
+    ) -> "Record":
         """Return the record of arrays, checked and mended as a file is; of gaps the longest part.
 
         Args:
@@ -163,7 +161,7 @@ class Record:
         stem: str | list[str] | Mapping[str, str] | None = None,
         name: str = "record",
         **reading: Any,
-    ) -> Record:
+    ) -> "Record":
         """Return the record of some columns of a table, read as those of a file are.
 
         A column with the mode of the controller, or with qualities, counts as in a file.
@@ -246,7 +244,7 @@ class Record:
         begins = (Gap(0, self.start), *self.gaps, Gap(len(self), 0.0))
         return tuple(Segment(a.row, b.row, a.start) for a, b in itertools.pairwise(begins))
 
-    def part(self, first: int, last: int) -> Record:
+    def part(self, first: int, last: int) -> "Record":
         """Return samples ``first`` up to, not including, ``last``."""
         rows = slice(first, last)
         start, gaps = self.start + first * self.sample_time, self.gaps
@@ -277,14 +275,14 @@ class Record:
         begins, ends = stretches(there, [gap.row for gap in self.gaps])
         return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
-    def good_parts(self) -> tuple[Record, ...]:
+    def good_parts(self) -> "tuple[Record, ...]":
         """Return the stretches without a gap and without bad or manual samples."""
         stretches = self.usable_rows()
         if stretches == [(0, len(self))]:
             return (self,)
         return tuple(self.part(first, last) for first, last in stretches)
 
-    def filled(self) -> Record:
+    def filled(self) -> "Record":
         """Return the record as one segment; in its gaps stand bad samples of NaN.
 
         A gap longer than the record itself is made as long as the record, and another run is

@@ -3,8 +3,6 @@
 A row is a sample with a place, an integer; only places without a row are filled.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Callable, Sequence

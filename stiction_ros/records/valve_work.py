@@ -1,7 +1,5 @@
 """What a valve has to do: how far its stem goes, how often it moves, how often it turns."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 
@@ -29,14 +27,14 @@ class ValveWork:
     reversals: float  # moves in the other direction than the one before
 
     @classmethod
-    def of(cls, stem: FloatArray) -> ValveWork:
+    def of(cls, stem: FloatArray) -> "ValveWork":
         """Return the work of the stem positions ``stem``, shape (N,), %."""
         steps = np.diff(stem)
         steps = steps[np.abs(steps) > STANDS * float(np.ptp(stem))] if len(stem) else steps
         turns = np.count_nonzero(np.diff(np.signbit(steps)))
         return cls(float(np.abs(steps).sum()), float(len(steps)), float(turns))
 
-    def per_hour(self, hours: float) -> ValveWork:
+    def per_hour(self, hours: float) -> "ValveWork":
         """Return the work of one hour, of what was done in ``hours``."""
         return ValveWork(self.travel / hours, self.moves / hours, self.reversals / hours)
 

@@ -1,7 +1,5 @@
 """All samples that a source holds of a loop, and the records that they make."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Callable, Sequence

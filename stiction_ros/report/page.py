@@ -1,7 +1,5 @@
 """What reports are made of: boxes, tables, and figures in words."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Free runs and step responses of what was identified."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping, Sequence

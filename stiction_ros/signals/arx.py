@@ -3,8 +3,6 @@ r"""Columns of an ARX equation: an output at its own lags, inputs at theirs.
 .. math:: y_k = \sum_{i=1}^{n_a} \alpha_i y_{k-i} + \sum_j \sum_{i=1}^{n_b} b_{ji} x^{(j)}_{k-d_j-i}
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from stiction_ros.effects.behaviour import FloatArray

@@ -7,8 +7,6 @@ The constant c is always fitted. Rivals with different delays are compared over 
 computed with the longest delay that is tried.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -53,7 +51,7 @@ class ArxOrders:
             raise InputError(f"row {self.first} has no complete past", where="first")
 
     @classmethod
-    def over(cls, output: int, input: int, longest_delays: Sequence[int]) -> ArxOrders:
+    def over(cls, output: int, input: int, longest_delays: Sequence[int]) -> "ArxOrders":
         """Return orders with ε = max(n_a, Σ_j (n_b + t_d,j)) as printed under (12).
 
         Args:
@@ -92,7 +90,7 @@ class ArxFit:
         """Modulus of the largest root of A(q); the model is stable below 1."""
         return largest_root(np.append(1.0, self.a))
 
-    def judged(self, y: FloatArray, stems: FloatArray, orders: ArxOrders) -> ArxFit:
+    def judged(self, y: FloatArray, stems: FloatArray, orders: ArxOrders) -> "ArxFit":
         """Return the same model with SE and residuals over output y, (N,), and stems, (m, N)."""
         theta = np.concatenate([self.a, self.b.ravel()])
         predicted = regressors(y, stems, self.delays, orders) @ theta + self.constant

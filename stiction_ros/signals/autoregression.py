@@ -4,8 +4,6 @@ Two ways to write it: coefficients φ of :math:`r_k = \sum_i \varphi_i r_{k-i} +
 polynomial D with :math:`D(q) r_k = e_k`, which is 1, −φ_1, …, −φ_p.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

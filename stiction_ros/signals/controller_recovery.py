@@ -14,8 +14,6 @@ recorded: it is there when the record has none, and the set-point is then the me
 c / K_i, at which OP rests.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Mapping

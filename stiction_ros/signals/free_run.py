@@ -3,8 +3,6 @@ r"""Free run of one ARX equation: its output, computed from its inputs alone.
 .. math:: y_k = c + \sum_j \sum_{i=1}^{n_b} b_{ji} x^{(j)}_{k-d_j-i} - \sum_{i=1}^{n_a} a_i y_{k-i}
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stretches of samples: where something is so without a break, and where a set-point rests."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """How much a signal moves about its slow mean."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray

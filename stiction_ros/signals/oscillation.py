@@ -18,8 +18,6 @@ References:
     J. Process Control 13, 2003, 91-100.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

@@ -12,8 +12,6 @@ outside keeps its time. The same from OP, with the error as input: a line there 
 set-point that is not in the record, or from another controller.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

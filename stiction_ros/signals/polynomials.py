@@ -1,7 +1,5 @@
 """Polynomials in the backward shift, monic, constant first: 1 + a_1 q⁻¹ + … ."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.compiled import compiled

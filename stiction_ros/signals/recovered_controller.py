@@ -1,7 +1,5 @@
 """The controller that a record shows: what it is recovered from, and what was found."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 

@@ -1,7 +1,5 @@
 """Lines of a spectrum: sine and cosine at a period and at its harmonics."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Outputs of a state-space model, computed from its inputs and its initial state."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

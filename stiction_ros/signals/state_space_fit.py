@@ -8,8 +8,6 @@ With A, C and K given, the error is linear in B, ξ_0 and y_0: driven by χ alon
 free-run error, driven by χ and y through A − K C the one-step error.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

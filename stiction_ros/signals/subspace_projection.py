@@ -9,8 +9,6 @@ so the part of :math:`Y_f` that :math:`W_p` explains beside :math:`U_f` (the obl
 projection) has the column space of :math:`\Gamma` and the row space of the states.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 

@@ -1,7 +1,5 @@
 """The velocity form of a controller: what moves of OP are made of."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray

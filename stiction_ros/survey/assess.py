@@ -1,7 +1,5 @@
 """One loop from its records to its row and its page: what a worker does."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 import traceback

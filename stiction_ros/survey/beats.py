@@ -1,7 +1,5 @@
 """When the cycles of a loop begin, and whether two loops keep the same time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray

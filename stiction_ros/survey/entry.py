@@ -1,7 +1,5 @@
 """What a survey says about one loop."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from collections.abc import Mapping
@@ -79,7 +77,7 @@ class Entry:
         return dataclasses.asdict(self)
 
     @classmethod
-    def from_line(cls, line: Mapping[str, Any]) -> Entry:
+    def from_line(cls, line: Mapping[str, Any]) -> "Entry":
         """Return the entry of a mapping that :meth:`to_line` made, also through JSON."""
         row = dict(line)
         cycle = row["oscillation"]

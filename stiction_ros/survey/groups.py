@@ -4,8 +4,6 @@ A valve that makes its own loop cycle moves what lies around it at its period, s
 first; then one that rings by its tuning; last what only bears a wave. The more regular is nearer.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Results as they come, a line each, from which a survey that was broken off goes on."""
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import json
@@ -68,7 +66,7 @@ class Journal:
         self._file.write(json_text(line, indent=None).encode() + b"\n")
         self._file.flush()
 
-    def __enter__(self) -> Journal:
+    def __enter__(self) -> "Journal":
         return self
 
     def __exit__(self, *_: object) -> None:

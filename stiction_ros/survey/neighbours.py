@@ -5,8 +5,6 @@ who is the likely source. What is added is said of neighbours alone: how far beh
 are, and that serving its valve is what helps them.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any

@@ -7,8 +7,6 @@
    is multiplied by what the cycle costs over the median of what was given.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """A whole survey: loops in, results as they come, the list, its pages and tables."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import re

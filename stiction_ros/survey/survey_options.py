@@ -1,7 +1,5 @@
 """How a survey looks at each loop."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.identification.identification_options import IdentificationOptions

@@ -6,8 +6,6 @@ effects, the time of the swap, the error after it. The command writes the files 
 differs.
 """
 
-from __future__ import annotations
-
 import argparse
 import functools
 import json

@@ -1,7 +1,5 @@
 """What benches over many seeds share: which seeds, and a log of every loop that was judged."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One function over many seeds, or other items, in worker processes."""
 
-from __future__ import annotations
-
 import argparse
 import multiprocessing
 import os

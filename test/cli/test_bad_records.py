@@ -1,7 +1,5 @@
 """A record that nothing can be said of gives one clear error, never a number."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

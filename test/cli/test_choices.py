@@ -1,7 +1,5 @@
 """The words of the options are those that the modules know."""
 
-from __future__ import annotations
-
 from stiction_ros.cli import gap
 from stiction_ros.cli.shared import searches
 from stiction_ros.discrepancy import GapVerdict

@@ -1,7 +1,5 @@
 """`stiction convert` and `stiction report`: any record in any form."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

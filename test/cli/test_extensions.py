@@ -1,7 +1,5 @@
 """What the studies bring to the command, and what is said where they are not installed."""
 
-from __future__ import annotations
-
 import pytest
 
 from stiction_ros.cli import extensions

@@ -1,7 +1,5 @@
 """`stiction experiment prbs` and `stiction fit-linear`, the paper's step repeated."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import shlex

@@ -1,7 +1,5 @@
 """What ``stiction gain`` prints: the verdict first, intervals beside figures, notes below."""
 
-from __future__ import annotations
-
 import pytest
 
 from stiction_ros.cli.gain import show

@@ -1,7 +1,5 @@
 """`stiction gap` from files to exit codes."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

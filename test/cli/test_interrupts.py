@@ -1,7 +1,5 @@
 """Ctrl-C waits until the compiler is left."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

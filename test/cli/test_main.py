@@ -1,7 +1,5 @@
 """The command `stiction`: exit codes, one-line errors, results."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

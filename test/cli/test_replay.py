@@ -1,7 +1,5 @@
 """`stiction replay` on a sample bag: what it prints, its JSON, its exit codes."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

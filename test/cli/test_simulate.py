@@ -1,7 +1,5 @@
 """`stiction simulate`: a record of a loop under its own controller."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`stiction valve-test`: planned from a record, followed on a simulated loop, judged."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Small models and literal re-implementations that the tests of control share."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 

@@ -1,7 +1,5 @@
 """Random steps, feasible and not: STICTION_RANDOM_STEPS sets their number (default 600)."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 

@@ -1,7 +1,5 @@
 """An OP moves no further in a sample than op_rate_limits says, whatever plans it."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re

@@ -1,7 +1,5 @@
 """Small loops whose missing effect is known."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

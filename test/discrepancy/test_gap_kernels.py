@@ -1,7 +1,5 @@
 """Compiled code gives what the plain formulas give."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

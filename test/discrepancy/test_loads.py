@@ -1,7 +1,5 @@
 """Loads where they enter, and their shapes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from gap_loops import loop, record

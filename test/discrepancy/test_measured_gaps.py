@@ -1,7 +1,5 @@
 """Measured loops without a model, with default options but for the bootstraps."""
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import math

@@ -1,7 +1,5 @@
 """Where a stem stands before the first sample."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from gap_loops import loop, record

@@ -1,7 +1,5 @@
 """Whole explanations: few effects before many, and a process that is a little off."""
 
-from __future__ import annotations
-
 import pytest
 from gap_loops import loop, record, with_cause
 

@@ -1,7 +1,5 @@
 """From a record to the name of what its simulation lacks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from gap_loops import loop, record, with_cause, without_set_points

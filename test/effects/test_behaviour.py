@@ -1,7 +1,5 @@
 """What holds for every effect, whichever file it is in."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

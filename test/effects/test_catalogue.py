@@ -1,7 +1,5 @@
 """The page of the catalogue says what the classes are."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

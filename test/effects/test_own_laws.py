@@ -1,7 +1,5 @@
 """A law with a third parameter and a jump form, from its file to answers and loop models."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A law and an effect in one file each, taken through all that knows behaviours."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Laws of the effects on a process."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Laws of the effects on sensors, records and disturbances with a memory."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Laws of the valve's effects other than friction."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """What the product answers is what was written down; a commit that changes a case says why."""
 
-from __future__ import annotations
-
 import pytest
 
 from stiction_studies import freeze

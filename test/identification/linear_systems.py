@@ -1,7 +1,5 @@
 """Random stable linear systems and their records, for the tests of linear identification."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """All samples of signals that are held as steps."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects import FloatArray

@@ -1,7 +1,5 @@
 """Simulated closed loops with known friction for the tests of identification."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects import Behaviour, FloatArray, HeStiction

@@ -1,7 +1,5 @@
 """The end of a search, compiled by another process."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

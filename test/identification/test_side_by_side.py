@@ -1,7 +1,5 @@
 """Two threads give what one gives, in the same order, errors included."""
 
-from __future__ import annotations
-
 import threading
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Rows of a loop for tests, and files of them."""
 
-from __future__ import annotations
-
 import datetime
 from collections.abc import Callable, Sequence
 from pathlib import Path

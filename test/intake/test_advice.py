@@ -1,7 +1,5 @@
 """What an error advises works when it is followed."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from collections.abc import Callable

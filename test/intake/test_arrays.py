@@ -1,7 +1,5 @@
 """Records from arrays and data frames."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

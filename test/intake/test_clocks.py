@@ -1,7 +1,5 @@
 """Clocks of exports: 12 hours, summer time, zones, words of months and halves of the day."""
 
-from __future__ import annotations
-
 import datetime
 import re
 import zoneinfo

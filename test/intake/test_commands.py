@@ -1,7 +1,5 @@
 """Commands read exports, and say what they read."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Every export that is usual is read right, or refused with the option that helps."""
 
-from __future__ import annotations
-
 import csv
 import gzip
 import io

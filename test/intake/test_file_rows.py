@@ -1,7 +1,5 @@
 """Rows of a tag list that count for one file alone."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

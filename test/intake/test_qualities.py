@@ -1,7 +1,5 @@
 """Columns of qualities are known by what they mean."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Rows keep their values together in every form of a table; what stands twice is counted."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

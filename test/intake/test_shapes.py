@@ -1,7 +1,5 @@
 """Tables of other shapes than time, OP, PV side by side."""
 
-from __future__ import annotations
-
 import sys
 import zipfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a dry run shows of the values, and what is said of values that do not fit their unit."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import sys
 import tempfile
 from pathlib import Path

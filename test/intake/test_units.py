@@ -1,7 +1,5 @@
 """What OP is counted in, by its name."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Exports that are written for people: units in cells, typeset signs, stamps without seconds."""
 
-from __future__ import annotations
-
 import datetime
 import sys
 from pathlib import Path

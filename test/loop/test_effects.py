@@ -1,7 +1,5 @@
 """Effects in the YAML of a loop, and in the plant that it describes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

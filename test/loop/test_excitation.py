@@ -1,7 +1,5 @@
 """Random binary moves, and the experiment of Appendix A."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Loop models from linear systems."""
 
-from __future__ import annotations
-
 import types
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Nodes of one graph in this process: a private context, one executor, no sleeps."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import random

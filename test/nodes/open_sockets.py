@@ -1,7 +1,5 @@
 """What a process has opened to the network, as the kernel tells."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 LISTEN = "0A"

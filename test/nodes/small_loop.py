@@ -1,7 +1,5 @@
 """A small scenario with fits and a swap, quick enough for tests."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import yaml

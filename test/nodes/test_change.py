@@ -1,7 +1,5 @@
 """From estimate to swap on two valves, and valves that change, in the graph and without it."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

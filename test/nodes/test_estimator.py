@@ -1,7 +1,5 @@
 """The estimator node, with the test in the place of plant and controller."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Iterator, Sequence
 from typing import Any

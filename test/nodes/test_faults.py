@@ -1,7 +1,5 @@
 """A few faults of ``stiction faults`` in one process: the run is what it is without them."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The whole graph in one process against the same loop without ROS."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Iterator

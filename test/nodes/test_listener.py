@@ -1,7 +1,5 @@
 """The command that fills the windows of all loops, as a process beside their publishers."""
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -1,7 +1,5 @@
 """The estimator's monitor in a graph, against the same without ROS."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import sys

@@ -1,7 +1,5 @@
 """What the package opens by default: no TCP port but that of the plant of the demonstration."""
 
-from __future__ import annotations
-
 import ast
 import contextlib
 import os

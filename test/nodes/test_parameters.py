@@ -1,7 +1,5 @@
 """Every parameter of every node: taken and in force, or refused with the reason."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import math

@@ -1,7 +1,5 @@
 """The plant node, with the test in the place of its commander."""
 
-from __future__ import annotations
-
 import functools
 import time
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """The player: what was recorded comes out again, at any rate, under control."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The access control file allows what the nodes do, and no second commander."""
 
-from __future__ import annotations
-
 import datetime
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The graph as processes: everything recorded, deterministic, nothing left behind."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

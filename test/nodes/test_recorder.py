@@ -1,7 +1,5 @@
 """The recorder among publishers: which topics it takes, how, and what it tells of the rest."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

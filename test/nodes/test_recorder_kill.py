@@ -1,7 +1,5 @@
 """kill -9 of the recorder at random moments: the bag opens and holds what was received."""
 
-from __future__ import annotations
-
 import random
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The recorder of one loop among several, its log time, and its bag when somebody removes it."""
 
-from __future__ import annotations
-
 import functools
 import shutil
 from collections.abc import Iterator

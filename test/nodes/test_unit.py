@@ -1,7 +1,5 @@
 """A cascade in one graph: each controller in its namespace, against the plant without ROS."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections import defaultdict

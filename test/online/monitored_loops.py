@@ -1,7 +1,5 @@
 """Small loops under PI control for the monitor, quick to simulate."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A bag of a loop that ran without ROS, message by message as the nodes publish them."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 from pathlib import Path

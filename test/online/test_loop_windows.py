@@ -1,7 +1,5 @@
 """Windows of many loops, filled as their samples come."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.online.loop_windows import LoopWindow

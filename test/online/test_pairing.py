@@ -1,7 +1,5 @@
 """Pairing of PV and OP by stamp."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

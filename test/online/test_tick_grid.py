@@ -1,7 +1,5 @@
 """The grid of ticks: what lies between two of them, and what a late one costs."""
 
-from __future__ import annotations
-
 import itertools
 
 from hypothesis import given

@@ -1,7 +1,5 @@
 """A bridge without ROS in a thread or a process of its own, with a controller that moves OP."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

@@ -7,8 +7,6 @@ ends with code 1 when a sample was missed, the bridge took more than a core, or 
 by 2 %.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -4,8 +4,6 @@
 the tag map to FILE.
 """
 
-from __future__ import annotations
-
 import asyncio
 import datetime
 import logging

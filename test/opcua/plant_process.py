@@ -1,7 +1,5 @@
 """The simulated plant as these tests run it, and how they wait for it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A tag map of one loop with one valve, and readings for it."""
 
-from __future__ import annotations
-
 from stiction_ros.opcua.reading import TagQuality, TagReading
 from stiction_ros.opcua.tag_map import GrantTags, LoopTags, OutputTags, ValveTags
 

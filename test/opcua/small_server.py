@@ -1,7 +1,5 @@
 """A server in a thread with the variables that a test names; without security, on 127.0.0.1."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import socket

@@ -1,7 +1,5 @@
 """A tag map by browsing: what the server has, under its own names."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The handshake: asked, granted, and lost at the first doubt."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import pytest

@@ -1,7 +1,5 @@
 """History of a real server becomes the record that was lived through."""
 
-from __future__ import annotations
-
 import datetime
 from collections.abc import Iterator
 from pathlib import Path

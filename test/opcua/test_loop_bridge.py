@@ -1,7 +1,5 @@
 """One loop bridged: samples out, OP written under the grant, lost at every fault."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -72,7 +70,7 @@ class Plant:
         self.mode = mode
         self.hear(MODE, good(mode, self.now))
 
-    def granted(self) -> Plant:
+    def granted(self) -> "Plant":
         self.run(10)
         assert self.bridge.grant.state is GrantState.ASKED, self.bridge.grant
         self.set_mode("ROUT")

@@ -1,7 +1,5 @@
 """The status of a bridged loop: the worst of what is wrong with it, in words and keys."""
 
-from __future__ import annotations
-
 from typing import Any
 from unittest.mock import MagicMock
 

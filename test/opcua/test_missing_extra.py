@@ -1,7 +1,5 @@
 """Without the extra ``opcua`` each of its commands says in one sentence what to install."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What may be written never leaves limits or rate."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

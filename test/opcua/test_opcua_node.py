@@ -1,7 +1,5 @@
 """The node ``opcua`` between a real server, in a process of its own, and topics."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

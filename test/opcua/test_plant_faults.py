@@ -6,8 +6,6 @@ they have them within the time of the watchdog is shown in test_control_system.p
 the test.
 """
 
-from __future__ import annotations
-
 import asyncio
 import datetime
 import signal

@@ -1,7 +1,5 @@
 """A tag that the server refuses keeps back its own loop, is named, and is tried again."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from collections.abc import Callable, Iterator, Mapping

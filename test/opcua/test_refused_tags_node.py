@@ -1,7 +1,5 @@
 """The node ``opcua`` with a map of which one tag is wrong: the other loops run."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tags that report when they change become samples, by the written rule."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Certificates, secrets, and what may not be connected with."""
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 import stat

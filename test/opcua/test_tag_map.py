@@ -1,7 +1,5 @@
 """Tag maps are read whole or refused with the place and the fix."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A valve test through the bridge: OP is moved while the operator grants it, and no longer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from small_maps import ALIVE, OP, PV, SP, good

@@ -3,8 +3,6 @@
 ``python test/opcua/tuning_trial.py`` prints the table of that page.
 """
 
-from __future__ import annotations
-
 import re
 import tempfile
 from pathlib import Path

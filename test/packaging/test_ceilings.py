@@ -1,7 +1,5 @@
 """How large the package may be. The ceilings are lowered, never raised."""
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import sys

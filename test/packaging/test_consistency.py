@@ -1,7 +1,5 @@
 """What is said twice about the package is said alike."""
 
-from __future__ import annotations
-
 import ast
 import configparser
 import importlib.metadata

@@ -1,7 +1,5 @@
 """The documentation site, and what a maintainer is told."""
 
-from __future__ import annotations
-
 import ast
 import code
 import re

@@ -1,7 +1,5 @@
 """The floors of the package: who imports whom, as pyproject.toml says it."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tomllib

@@ -1,7 +1,5 @@
 """The Foxglove layout names topics and fields that a recorded run has."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The script that measures the house."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path

@@ -3,8 +3,6 @@
 `ros2 run` finds the package through the ament index and its executables in lib/stiction_ros.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re

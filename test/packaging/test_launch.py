@@ -1,7 +1,5 @@
 """The launch file against the table of nodes that the demo starts; launch itself is not needed."""
 
-from __future__ import annotations
-
 import runpy
 import sys
 import types

@@ -1,7 +1,5 @@
 """The script that shows which packages three calls enter."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Figures as SVG: their axes, and which curves they show."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from pathlib import Path

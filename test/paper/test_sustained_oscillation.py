@@ -1,7 +1,5 @@
 """Δu is the span of the cycle, not that of the throws at set-point moves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

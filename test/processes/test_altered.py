@@ -1,7 +1,5 @@
 """A process with effects behind its outputs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Transfer functions at their samples."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """One record from one file, as it is: nothing is repaired but jitter and short holes in time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Parts and spoilt copies of a bag."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

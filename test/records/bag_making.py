@@ -1,7 +1,5 @@
 """Messages as bytes, made by `rosbags` so that no ROS is needed."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@
 test/nodes/test_recorder_kill.py`` makes the numbers that studies/reports/ holds.
 """
 
-from __future__ import annotations
-
 import os
 
 

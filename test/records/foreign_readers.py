@@ -3,8 +3,6 @@
 ``python test/records/foreign_readers.py BAG`` prints how many messages were the same.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import shutil
 import subprocess

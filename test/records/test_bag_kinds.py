@@ -1,7 +1,5 @@
 """Bags as other recorders leave them: out of order, packed, without definitions, of sqlite3."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

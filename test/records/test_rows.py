@@ -1,7 +1,5 @@
 """A row is a sample: its values stay together, whatever its stamp is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given

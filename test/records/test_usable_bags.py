@@ -1,7 +1,5 @@
 """What happens to a bag in a plant, and what identify, report and convert still make of it."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys

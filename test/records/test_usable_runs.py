@@ -1,7 +1,5 @@
 """The bag of a live run with a pause, a bad message or a restart: its report, and its replay."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

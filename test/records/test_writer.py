@@ -1,7 +1,5 @@
 """Records that are written are read back digit by digit."""
 
-from __future__ import annotations
-
 import dataclasses
 import tempfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reports in a browser: on a screen and on a phone, in light and dark."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Noise of one signal: what is made white, what is found again."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

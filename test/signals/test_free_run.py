@@ -1,7 +1,5 @@
 """What inputs alone make of an equation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Sines and cosines at a period and at its harmonics."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Pages in headless Chromium: what a reader would see of them."""
 
-from __future__ import annotations
-
 import html
 import json
 import re

@@ -1,7 +1,5 @@
 """Loops and entries for the tests of the survey."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Folders as plants have them: nothing ends a survey, is lost or comes twice."""
 
-from __future__ import annotations
-
 import csv
 import os
 import shutil

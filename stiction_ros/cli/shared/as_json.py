@@ -1,7 +1,5 @@
 """Results as JSON, to a file or to standard output."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

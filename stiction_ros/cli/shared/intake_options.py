@@ -1,7 +1,5 @@
 """The options by which commands read records, whatever they are kept in."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 import sys

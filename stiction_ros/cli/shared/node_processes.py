@@ -1,7 +1,5 @@
 """The nodes of one loop as processes: started together, watched, ended in order."""
 
-from __future__ import annotations
-
 import os
 import random
 import re

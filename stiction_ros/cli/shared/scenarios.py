@@ -1,7 +1,5 @@
 """The scenarios that come along, and the parameters of their nodes, for demo and launch."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Options of the searches, and which search a command calls: the floors' own, or the paper's."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -133,8 +131,8 @@ def search_options(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def identify_by(
-    method: str, options: IdentificationOptions, chosen: dict[str, Any]
-) -> Callable[[Record, Callable[[float], None]], Identification]:
+    method: str, options: "IdentificationOptions", chosen: dict[str, Any]
+) -> "Callable[[Record, Callable[[float], None]], Identification]":
     """Return what identifies a record by one of :data:`METHODS`, as ``chosen``."""
     if method in PAPER_METHODS:
         from stiction_ros.paper.methods import identify as identify_as_paper

@@ -1,7 +1,5 @@
 """What is handed over of each effect: figures with units and intervals, and what it closes."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Which behaviours the workflow did not consider, and why: nothing is left out silently."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

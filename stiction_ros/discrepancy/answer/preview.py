@@ -1,7 +1,5 @@
 """The experiment that would decide, simulated: what each of the rivals would show."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping
 

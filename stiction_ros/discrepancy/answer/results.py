@@ -1,7 +1,5 @@
 """What the workflow hands over."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

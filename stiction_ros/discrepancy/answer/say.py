@@ -1,7 +1,5 @@
 """Step 6: one word for all looks, and the experiment that would say more."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from stiction_ros.discrepancy.answer.found_effects import FoundEffect

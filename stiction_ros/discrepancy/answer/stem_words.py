@@ -1,7 +1,5 @@
 """What a recorded stem says of its valve by itself, before any process is asked."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 

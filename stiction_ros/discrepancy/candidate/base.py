@@ -1,7 +1,5 @@
 """What a candidate is: one change of the current model, with figures to be searched."""
 
-from __future__ import annotations
-
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -39,7 +37,7 @@ class Response:
             return self.shifts[output]
         return np.asarray(self.sizes[output] @ factors)
 
-    def pick(self, point: int) -> Response:
+    def pick(self, point: int) -> "Response":
         """Return the response at one point of the grid."""
         return Response(
             {i: v[:, point : point + 1] for i, v in self.shifts.items()},

@@ -1,7 +1,5 @@
 """Rivals outside the catalogue: they show that something is amiss which it does not name."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Self
 

@@ -1,7 +1,5 @@
 """Candidates in the process, between its valves and its sensors."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Self

@@ -1,7 +1,5 @@
 """Candidates of behaviours that say themselves on which axes they are searched."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Self
 

@@ -1,7 +1,5 @@
 """Candidates at a valve: one more effect behind those that the model has already."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Disturbances where they enter: beside the stem of a valve, or on an output."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Self
 

@@ -1,7 +1,5 @@
 """Shapes in time that a disturbance may have, as candidates search them."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from abc import ABC, abstractmethod

@@ -1,7 +1,5 @@
 """OP recomputed from PV and SP: was the recorded controller at work, on the recorded clock?"""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import math

@@ -1,7 +1,5 @@
 """Values of PV that a historian filled in between those that it kept."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import BoolArray, FloatArray

@@ -1,7 +1,5 @@
 """Step 1, the gate: what is wrong with the data, and what it can show at all."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -197,7 +195,7 @@ class _Rests:
     count: int  # N, of the record
 
     @classmethod
-    def of(cls, values: FloatArray) -> _Rests:
+    def of(cls, values: FloatArray) -> "_Rests":
         return cls(*stretches(np.diff(values) == 0.0), len(values))
 
     @property

@@ -1,7 +1,5 @@
 """A controller that scans again between two samples of the record: the OP that was not recorded."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -72,7 +70,7 @@ def scanned_twice(model: LoopModel, runs: Runs) -> Scans | None:
     return None
 
 
-def _parts(model: LoopModel, runs: Runs) -> list[_Part]:
+def _parts(model: LoopModel, runs: Runs) -> "list[_Part]":
     low, high = model.limits[0].tolist()
     return [
         _Part.of(runs.op[rows, 0], error, (low, high))
@@ -80,7 +78,7 @@ def _parts(model: LoopModel, runs: Runs) -> list[_Part]:
     ]
 
 
-def _fitted(parts: Sequence[_Part]) -> tuple[float, float]:
+def _fitted(parts: "Sequence[_Part]") -> tuple[float, float]:
     """Return K and K h / T_i by least squares, the errors between samples on a cubic through four.
 
     They are not where SP has moved: such samples are not asked.
@@ -118,7 +116,7 @@ class _Part:
     moves: FloatArray  # of OP, NaN where it is at a limit, shape (N − 1,)
 
     @classmethod
-    def of(cls, op: FloatArray, error: FloatArray, limits: tuple[float, float]) -> _Part:
+    def of(cls, op: FloatArray, error: FloatArray, limits: tuple[float, float]) -> "_Part":
         """Return a record, its moves between limits alone."""
         inside = (op > limits[0]) & (op < limits[1])
         return cls(op, error, np.where(inside[1:] & inside[:-1], np.diff(op), np.nan))

@@ -5,8 +5,6 @@ r"""The set-point that a record lacks, where the law of its controller tells it.
 rests where the set-point r does, and jumps where it does. The sums are over the scans of a sample.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -81,7 +79,7 @@ class _Part:
     free: BoolArray  # where OP and the two before it are between the limits, shape (N,)
 
     @classmethod
-    def of(cls, runs: Runs, rows: slice, scans: int, limits: FloatArray) -> _Part:
+    def of(cls, runs: Runs, rows: slice, scans: int, limits: FloatArray) -> "_Part":
         """Return the rows of one record."""
         op, pv = runs.op[rows, 0], runs.pv[rows, 0]
         free = (op > limits[0]) & (op < limits[1])

@@ -1,7 +1,5 @@
 """Steps 5 and 6: what the scores allow to say."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import math

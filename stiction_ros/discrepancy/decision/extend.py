@@ -1,7 +1,5 @@
 """Step 7: an effect becomes a block of the loop model, or is rolled back."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Where stems are recorded, they speak against effects that move them elsewhere."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Step 4: every candidate scored against the current model, which stays as it is."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 

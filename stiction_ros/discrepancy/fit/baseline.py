@@ -1,7 +1,5 @@
 """The current model alone, which every candidate is judged against."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
@@ -65,7 +63,7 @@ class Baseline:
         gap: FloatArray | None = None,
         columns: Sequence[FloatArray] | None = None,
         like: Sequence[Mapping[int, NoiseFit]] = (),
-    ) -> Baseline:
+    ) -> "Baseline":
         """Fit the noise of the current model.
 
         Args:
@@ -130,7 +128,7 @@ class Baseline:
             total += fit.bic(0) + fit.held_minus_two_log
         return total
 
-    def held_gain(self, before: Baseline) -> float:
+    def held_gain(self, before: "Baseline") -> float:
         """Return −2 log likelihood that it gains on the held-out rows against another model."""
         return sum(
             old.held_minus_two_log - new.held_minus_two_log

@@ -1,7 +1,5 @@
 """Which blocks are kept back: not those that hold nearly all of what nothing foretells."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How well every point of a grid explains a gap, under given noise."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -118,7 +116,7 @@ def taken_by_sizes(
 
 
 def misfit(
-    base: Baseline, gap: FloatArray, response: Response, ar: Mapping[int, FloatArray]
+    base: "Baseline", gap: FloatArray, response: Response, ar: Mapping[int, FloatArray]
 ) -> FloatArray:
     """Return Σ n log(sum of squared innovations) for every point of a grid under given φ.
 
@@ -147,7 +145,7 @@ PROBE = 0.05  # of a linear axis, at which its parabola is taken
 
 
 def settled(
-    base: Baseline,
+    base: "Baseline",
     gap: FloatArray,
     candidate: Candidate,
     coordinates: FloatArray,

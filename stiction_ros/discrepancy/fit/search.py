@@ -1,7 +1,5 @@
 """The best figures of one candidate: a grid simulated at once, then ever smaller grids."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
@@ -103,7 +101,7 @@ def fit_candidate(
     return search.exact(search.best())
 
 
-def _dated(search: _Search) -> CandidateFit:
+def _dated(search: "_Search") -> CandidateFit:
     """Return the best fit with its moment found on all rows, the held-out ones included.
 
     A moment within a held-out block leaves no other trace than before and after it.

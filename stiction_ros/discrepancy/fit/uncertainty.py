@@ -1,7 +1,5 @@
 """How sure the figures are."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
@@ -38,7 +36,7 @@ class Region:
     excess: FloatArray  # of −2 log likelihood over the least one, shape (K,)
 
     @classmethod
-    def around(cls, base: Baseline, fit: CandidateFit) -> Region:
+    def around(cls, base: Baseline, fit: CandidateFit) -> "Region":
         """Search the region around a fit, factors at their best, noise as the fit left it.
 
         Points are thrown into boxes that follow what is not rejected, and along the differences
@@ -73,7 +71,7 @@ class Region:
         inside = excess <= bound
         return cls(fit.candidate.values(points[inside]), excess[inside])
 
-    def shown(self) -> Region:
+    def shown(self) -> "Region":
         """Return the points that are extreme in one figure, the best ones, and some between."""
         ends = np.concatenate([self.points.argmin(axis=0), self.points.argmax(axis=0)])
         between = np.linspace(0, len(self.points) - 1, SHOWN).astype(int)

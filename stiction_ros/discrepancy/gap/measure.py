@@ -1,7 +1,5 @@
 """Step 2: how large the gap is, in free run and in one step, against its noise floor."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The noise that was found against the one that the model declares."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

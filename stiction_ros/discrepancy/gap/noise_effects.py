@@ -1,7 +1,5 @@
 """Noise beyond the declared one, told as an effect: what wanders, how far, and where it enters."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Laws of a noise beyond the declared one, by their states: what wanders, and where it enters."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Step 3, where the gap is: in time, at which moves, at which place, at which frequency."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The noise that a loop model declares, as autoregressions of what its free run leaves."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

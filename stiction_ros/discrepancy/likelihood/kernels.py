@@ -3,8 +3,6 @@
 Columns are rows of their arrays here, so that inner loops run over samples.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.compiled import compiled

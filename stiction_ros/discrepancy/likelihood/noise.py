@@ -1,7 +1,5 @@
 """The likelihood of a gap: linear columns projected out, autoregressive noise, innovations."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence

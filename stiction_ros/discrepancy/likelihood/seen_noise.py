@@ -1,7 +1,5 @@
 """The declared noise as records show it: values rounded, and an OP that is not all that acted."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

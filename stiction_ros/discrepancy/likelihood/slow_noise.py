@@ -1,7 +1,5 @@
 """White noise beside a first-order one: two figures that remember longer than any short order."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.compiled import compiled

@@ -1,7 +1,5 @@
 """Noise by its states: what one-step predictions of a state-space model miss, compiled."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.compiled import compiled

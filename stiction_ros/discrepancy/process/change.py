@@ -1,7 +1,5 @@
 """A given process a few per cent off: what of it has to be changed beside the effects."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any

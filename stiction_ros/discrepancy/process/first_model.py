@@ -1,7 +1,5 @@
 """A first linear model for loops that have none."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """One output's ARX equation fitted in free run, behind stems that are given."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -40,7 +38,7 @@ class Equation:
         """Whether all poles lie well inside the unit circle."""
         return largest_root(self.denominator) < RADIUS
 
-    def moved(self, step: FloatArray) -> Equation:
+    def moved(self, step: FloatArray) -> "Equation":
         """Return the equation with a step in (a, b of each valve) added."""
         first, parts = len(self.a), []
         for b in self.b:
@@ -48,7 +46,7 @@ class Equation:
             first += len(b)
         return dataclasses.replace(self, a=self.a + step[: len(self.a)], b=tuple(parts))
 
-    def at(self, delay: Sequence[int]) -> Equation:
+    def at(self, delay: Sequence[int]) -> "Equation":
         """Return the equation with other delays."""
         return dataclasses.replace(self, delay=tuple(delay))
 

@@ -1,7 +1,5 @@
 """The process fitted again, behind given effects: for models that were fitted to the records."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

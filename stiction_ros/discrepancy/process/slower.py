@@ -1,7 +1,5 @@
 """What of an equation may be a few per cent off: gain, time constants, leads, dead time."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """The free run: a loop model driven by the recorded OP of one or more records."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 from collections.abc import Mapping, Sequence

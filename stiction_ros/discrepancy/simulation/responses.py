@@ -1,7 +1,5 @@
 """Responses of a process to stem positions, for many stems at once."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The first step: the data are judged, and the model is driven by the recorded OP."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from collections.abc import Sequence

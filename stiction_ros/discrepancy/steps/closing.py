@@ -1,7 +1,5 @@
 """After the looks: what may be said of what was found, and the answer as it is handed over."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

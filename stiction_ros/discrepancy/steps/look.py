@@ -1,7 +1,5 @@
 """One look: every candidate scored, one effect added if the scores allow a name for it."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """The process as it was given, changed where that explains more than effects do."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """After the looks: whole explanations compared, and each effect told again beside the others."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence

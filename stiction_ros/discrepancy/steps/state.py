@@ -1,7 +1,5 @@
 """What a gap run is given, and what it believes between two of its steps."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -54,7 +52,7 @@ class State:
     opened: int = 0  # the first look at the process as it is now
     testable: tuple[Testable, ...] = ()  # what the last look could have seen
     # what is believed without the first effect that was added in doubt; None where none was
-    doubted: State | None = None
+    doubted: "State | None" = None
 
     def others(self, k: int) -> tuple[AddedEffect, ...]:
         """Return all added effects but one."""
@@ -64,7 +62,7 @@ class State:
         """Return the baseline with all added effects but one, their linear figures left open."""
         return base_beside(self.bare, runs, self.others(k))
 
-    def with_added(self, runs: Runs, added: Sequence[AddedEffect]) -> State:
+    def with_added(self, runs: Runs, added: Sequence[AddedEffect]) -> "State":
         """Return the same process with these effects in place of those that were added."""
         base = base_with(self.bare, runs, added)
         return dataclasses.replace(self, added=tuple(added), base=base)

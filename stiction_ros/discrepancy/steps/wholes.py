@@ -1,7 +1,5 @@
 """Whole explanations, compared over the same rows: few effects before many."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

@@ -1,7 +1,5 @@
 """A record whose PV comes too late."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """A controller that is tuned otherwise than it was written down."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """A coloured disturbance: noise with a memory."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import ClassVar

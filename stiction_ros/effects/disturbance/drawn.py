@@ -1,7 +1,5 @@
 """What the disturbances share that are drawn by chance."""
 
-from __future__ import annotations
-
 import dataclasses
 from abc import abstractmethod
 from typing import ClassVar

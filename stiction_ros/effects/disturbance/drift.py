@@ -1,7 +1,5 @@
 """An unmeasured disturbance, or a sensor, that drifts."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """What the disturbances share that come again and again."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from abc import abstractmethod

@@ -1,7 +1,5 @@
 """A disturbance that wanders and never comes back by itself."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import ClassVar

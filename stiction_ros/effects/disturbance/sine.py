@@ -1,7 +1,5 @@
 """An unmeasured disturbance that is a sine."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """An unmeasured disturbance that comes at one moment."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """An unmeasured disturbance that is a triangle wave."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Choudhury's data-driven stiction model, S and J."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """He's data-driven stiction model, equations (3) and (4)."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """The smoothed form of He's model, equations (5) and (6)."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Kano's data-driven stiction model: stopped and moving states, S and J."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Kano's model with its switches replaced by hyperbolic tangents."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any, ClassVar

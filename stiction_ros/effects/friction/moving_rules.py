@@ -15,8 +15,6 @@ fill a rectangle in the plane of (J, S), and inside it the stem is affine in f_D
 Before the first slip the threshold is f_S for all of them.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
@@ -55,7 +53,7 @@ class MovingRules(ABC):
         """Return the direction of a first slip at sample k from ``level``, ±1."""
 
     @abstractmethod
-    def follow(self, trace: Recorder, first: FirstSlip, jump: float, reverse: float) -> None:
+    def follow(self, trace: "Recorder", first: FirstSlip, jump: float, reverse: float) -> None:
         """Follow OP behind the first slip with the given J and S, %."""
 
     def first_slip(self, level: float, static: float) -> FirstSlip:

@@ -3,8 +3,6 @@
 S = f_S + f_D is the width of the band that OP crosses after a reversal, J = f_S − f_D the jump.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Self
 

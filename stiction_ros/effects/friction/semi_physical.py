@@ -1,7 +1,5 @@
 """The semi-physical stiction model of He and Wang: He's law with an overshoot factor."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

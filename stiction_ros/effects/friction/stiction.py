@@ -1,7 +1,5 @@
 """What a law of stiction is, and what a controller sees of it that moves OP in steps."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import ClassVar, Self
@@ -44,7 +42,7 @@ class JumpForm:
         strokes: samples in which OP must go the same way until the stem slips.
     """
 
-    law: Stiction
+    law: "Stiction"
     static_friction: float
     dynamic_friction: float
     overshoot: float = 1.0
@@ -101,7 +99,7 @@ class JumpForm:
         strokes = np.linspace(begin, op, self.strokes + 1)[0 if turned else 1 :]
         return [*strokes.tolist(), op]
 
-    def raised(self, static_friction: float) -> JumpForm:
+    def raised(self, static_friction: float) -> "JumpForm":
         """Return the form of the same law with a larger f_S, other parameters kept."""
         form = self.law.with_frictions(static_friction, self.dynamic_friction).jump_form()
         assert form is not None

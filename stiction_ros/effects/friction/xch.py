@@ -1,7 +1,5 @@
 """A two-state law in the parameters of He, standing in for the XCH model."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

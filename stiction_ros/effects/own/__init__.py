@@ -1,7 +1,5 @@
 """Effects of one's own: files in this folder, and in those that STICTION_EFFECTS lists."""
 
-from __future__ import annotations
-
 import os
 
 __path__ += [

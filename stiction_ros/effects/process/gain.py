@@ -1,7 +1,5 @@
 """A process that answers more, or less, than the model says."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

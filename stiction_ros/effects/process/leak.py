@@ -1,7 +1,5 @@
 """Leak: a process that loses a share of what it has gathered."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """A process that is slower than its model."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

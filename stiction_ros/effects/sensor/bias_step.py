@@ -1,7 +1,5 @@
 """A sensor whose calibration jumps."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """A sensor that ends before its signal does."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

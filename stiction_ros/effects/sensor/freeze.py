@@ -1,7 +1,5 @@
 """A sensor that stands still for a while."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """A sensor, or a historian, that rounds."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Backlash: the play between actuator and stem."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """A valve whose flow is not proportional to its travel."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import ClassVar

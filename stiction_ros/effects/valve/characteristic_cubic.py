@@ -1,7 +1,5 @@
 """A characteristic that follows no exponential: a curve of two figures."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import ClassVar

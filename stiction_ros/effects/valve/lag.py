@@ -1,7 +1,5 @@
 """A first-order lag, of a valve or of a sensor."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import ClassVar

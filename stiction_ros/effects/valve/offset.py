@@ -1,7 +1,5 @@
 """A valve that stands beside where OP asks it to be."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """A valve that stops short of its ends."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Slew: an actuator whose speed is limited."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

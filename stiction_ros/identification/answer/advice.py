@@ -1,7 +1,5 @@
 """What goes with every answer, whichever method gave it: what would decide, and plausibility."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.identification.answer.experiment import experiment_for

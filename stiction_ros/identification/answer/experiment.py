@@ -1,7 +1,5 @@
 """What would decide on a valve where its record does not: an experiment with figures from it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The identified loop as a loop model, which plant, controller and ``gap`` load."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

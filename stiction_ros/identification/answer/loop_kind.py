@@ -4,8 +4,6 @@ It decides nothing about the valve: a process that a loop of this kind cannot ha
 something else than the valve was fitted, and is told as a note.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from collections.abc import Mapping

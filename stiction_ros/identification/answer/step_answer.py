@@ -1,7 +1,5 @@
 """How an output answers a step of one stem, by the identified process."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -32,7 +30,7 @@ class StepAnswer:
     sample_time: float  # s
 
     @classmethod
-    def of(cls, model: OutputModel, valve: str, samples: int, sample_time: float) -> StepAnswer:
+    def of(cls, model: OutputModel, valve: str, samples: int, sample_time: float) -> "StepAnswer":
         """Return the answer within half a record.
 
         Args:
@@ -49,7 +47,7 @@ class StepAnswer:
     @classmethod
     def of_values(
         cls, output: str, values: FloatArray, noise: float, sample_time: float
-    ) -> StepAnswer:
+    ) -> "StepAnswer":
         """Return the answer that has these values.
 
         Args:
@@ -64,7 +62,7 @@ class StepAnswer:
     @classmethod
     def _of(
         cls, output: str, values: FloatArray, wait: int, noise: float, sample_time: float
-    ) -> StepAnswer:
+    ) -> "StepAnswer":
         reached, before = (np.abs(part).max() for part in (values, values[: len(values) // 2 + 1]))
         lag = None
         if reached <= GROWS * before:

@@ -1,7 +1,5 @@
 """An identification for people: as text, as a table of HTML, as a table of rich."""
 
-from __future__ import annotations
-
 import html
 import math
 import textwrap

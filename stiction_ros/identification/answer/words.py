@@ -1,7 +1,5 @@
 """The answer in plain sentences: why, how much it matters, what to do next."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from stiction_ros.identification.result.cause import Cause, CauseKind

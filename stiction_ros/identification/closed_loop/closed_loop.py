@@ -6,8 +6,6 @@ its friction OP moves less. Where a load from outside moved the loop, friction f
 neither.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

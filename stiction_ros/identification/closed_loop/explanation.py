@@ -1,7 +1,5 @@
 """Which cause explains an oscillation: one decision from all that closing the loop shows."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.identification.closed_loop.closed_loop import (

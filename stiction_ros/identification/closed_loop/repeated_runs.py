@@ -1,7 +1,5 @@
 """The runs of a loop that is closed again, with the frictions that may be and without."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -81,7 +79,7 @@ class Repeated:
         valves: Sequence[ValveEstimate],
         pairs: Pairs,
         periods: Sequence[float],
-    ) -> Repeated:
+    ) -> "Repeated":
         """Return the loop of identified ``valves``."""
         frictions = np.array([tried_frictions(valve) for valve in valves])
         simulated = free_run(process, loop, loop.stem)

@@ -4,8 +4,6 @@ OP and PV about their means over their standard deviations: what is computed in 
 not depend on those of the record.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -13,8 +13,6 @@ chosen with the others. A response of the other sign is no process: it is the co
 backwards, through samples that were averaged or held.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which frictions a record does not reject."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -42,7 +40,7 @@ class Accepted:
     material_gain: float
     profile: tuple[tuple[float, float], ...]  # rows (f_S, least loss above the best), best over f_D
 
-    def times(self, span: float) -> Accepted:
+    def times(self, span: float) -> "Accepted":
         """Return the same with frictions in % of a valve whose OP has this span, %."""
         static, dynamic, band = (
             (span * low, span * high) for low, high in (self.static, self.dynamic, self.band)

@@ -1,7 +1,5 @@
 """One choice of frictions, and what judges many of them at once."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -28,7 +26,7 @@ class Candidate:
     stems: FloatArray  # scaled, shape (m, n)
     fits: tuple[OutputFit, ...]  # one per output
 
-    def beginning(self, rows: int) -> Candidate:
+    def beginning(self, rows: int) -> "Candidate":
         """Return the candidate on the first ``rows`` of a record; what was fitted stays."""
         return dataclasses.replace(self, stems=np.ascontiguousarray(self.stems[:, :rows]))
 
@@ -56,7 +54,7 @@ class Judge:
         fits: Sequence[OutputFit],
         *,
         held: bool = False,
-    ) -> Judge:
+    ) -> "Judge":
         """Return what judges stems under the noise and prior of ``fits``.
 
         Args:

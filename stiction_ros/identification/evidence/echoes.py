@@ -6,8 +6,6 @@ that cycles, or a load that swings at no exact time. Such a wave moves OP in tim
 friction does, and no line of one period stands for it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray

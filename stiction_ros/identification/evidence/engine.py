@@ -1,7 +1,5 @@
 """Identification by evidence: friction first, under any smooth process, then the process."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Compiled: the evidence of stems under a given noise and prior."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One record made ready: the rows that every friction, noise and delay is judged on."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Sequence
@@ -66,7 +64,7 @@ class Problem:
         options: IdentificationOptions | None = None,
         rate: int = 1,
         tunings: tuple[Tuning | None, ...] = (),
-    ) -> Problem:
+    ) -> "Problem":
         """Prepare a whole record.
 
         Args:
@@ -98,7 +96,7 @@ class Problem:
             shrunk=slow.std(axis=1),
         )
 
-    def beginning(self, rows: int) -> Problem:
+    def beginning(self, rows: int) -> "Problem":
         """Return the first ``rows`` of the record, in the scale of the whole; all are itself."""
         if rows == self.rows:
             return self
@@ -109,13 +107,13 @@ class Problem:
             least_moves=FEW_MOVES,
         )
 
-    def under(self, valve: int, law: type[FrictionLaw]) -> Problem:
+    def under(self, valve: int, law: type[FrictionLaw]) -> "Problem":
         """Return the problem with another law of one valve, what it has behind f_S and f_D held."""
         laws, further = list(self.laws), list(self.further or ((),) * len(self.laws))
         laws[valve], further[valve] = law, first_values(law)
         return dataclasses.replace(self, laws=tuple(laws), further=tuple(further))
 
-    def with_waves(self, lines: Sequence[Sequence[float]]) -> Problem:
+    def with_waves(self, lines: Sequence[Sequence[float]]) -> "Problem":
         """Return the problem beside waves from outside.
 
         Args:

@@ -1,7 +1,5 @@
 """A law's further parameters under the evidence for friction."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -6,8 +6,6 @@ first few turns of OP it is a wide valley. So the whole triangle is looked at th
 and what lies round them at ever smaller steps, are held against ever longer beginnings.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -8,8 +8,6 @@ denominator. With K laws tried, α is (1 − the level of the intervals) / K. As
 law is rejected for a tenth of what its friction gains. The laws tried have two figures, as He's.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The figures of one valve, from what the rates show and from its closed loop."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -8,8 +8,6 @@ problem has one. Level and responses are integrated out, noise and prior chosen 
 the marginal likelihood is least, in turns.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

@@ -10,8 +10,6 @@ happens to move in time with it. A wave that is tried is tried with and without 
 Here ω and H are found, friction left out; each sine costs log n, as in BIC.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Sequence
@@ -97,7 +95,7 @@ class _Beside:
     left: FloatArray  # of the output, shape (n,)
 
     @classmethod
-    def of(cls, problem: Problem, output: int) -> _Beside:
+    def of(cls, problem: Problem, output: int) -> "_Beside":
         """Take an output's last samples and all taps of valves that follow OP."""
         y, rows = problem.pv[output], np.arange(problem.first, problem.rows)
         columns = lagged(y, range(1, NOISE_ORDER + 1), problem.first)

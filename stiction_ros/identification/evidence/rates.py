@@ -16,8 +16,6 @@ Where a wave from outside may be in an output, all this is done once more beside
 rate the better of both counts, with and without friction alike.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Sequence
@@ -138,7 +136,7 @@ class Agreement:
     alike: bool
 
     @classmethod
-    def alone(cls, look: Look, valve: int) -> Agreement:
+    def alone(cls, look: Look, valve: int) -> "Agreement":
         """Return what one rate says, its word taken for as much as that of two."""
         return cls(look, look.beyond_price(valve), look.covers(valve))
 

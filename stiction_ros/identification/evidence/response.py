@@ -3,8 +3,6 @@
 Where that rival is not beaten, the stem is stuck, the valve is bypassed, or a tag is the wrong one.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

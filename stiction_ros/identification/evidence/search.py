@@ -4,8 +4,6 @@ One function judges, the loss of :mod:`.fit`. A seed is only where it is looked 
 nothing is accepted that is worse than what is known, and everything that was fitted is kept.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

@@ -6,8 +6,6 @@ mean under the ideal valve and autoregressive noise, both fitted to lines betwee
 the ideal valve then explains them, and friction can gain only by rows that were measured.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

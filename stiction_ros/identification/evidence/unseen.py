@@ -10,8 +10,6 @@ smaller than the samples show for answering late: of a slip that they give no re
 jump makes the best already.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -33,7 +31,7 @@ class Unseen:
     more: float  # by how much OP goes farther between samples
 
     @classmethod
-    def of(cls, op: FloatArray) -> Unseen:
+    def of(cls, op: FloatArray) -> "Unseen":
         """Return what samples of OP leave open, shape (N,), N at least 20."""
         return cls(LATE * float(np.abs(np.diff(op)).mean()), BETWEEN * innovation(op))
 

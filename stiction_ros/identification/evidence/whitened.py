@@ -1,7 +1,5 @@
 """One output and stems, whitened by a given noise: what no prior changes, and any prior's loss."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -81,7 +79,7 @@ class Whitened:
         stems: FloatArray,
         noise: FloatArray,
         without: int | None = None,
-    ) -> Whitened:
+    ) -> "Whitened":
         """Whiten an output and the stems beside it.
 
         Args:

@@ -12,8 +12,6 @@ Few are: where OP is noisy, or the valve rests all through the first window, the
 not be among them, and the grids of :mod:`.search` are what is left.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

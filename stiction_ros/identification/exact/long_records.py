@@ -5,8 +5,6 @@ is within a few thousandths of the best for the whole, so only its neighbourhood
 looked at with all samples; the cost grows with the length, not with its square.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

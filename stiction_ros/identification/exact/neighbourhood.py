@@ -5,8 +5,6 @@ until no accepted pattern touches its edge. Within it the optimum is exact under
 D/A at hand (:mod:`.pattern_search`).
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

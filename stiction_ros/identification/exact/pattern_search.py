@@ -5,8 +5,6 @@ the (J, S) plane. Which rectangle is worth it is for :mod:`.neighbourhood` and
 :mod:`.growing_patterns` to say; the remaining frictions are searched on grids (:mod:`.search`).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 from functools import partial

@@ -7,8 +7,6 @@ under the noise model (:mod:`stiction_ros.identification.problem.output_error`);
 the best switching pattern of its neighbourhood (:mod:`.pattern_search`).
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Callable, Mapping

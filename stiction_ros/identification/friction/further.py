@@ -5,8 +5,6 @@ are scattered in ever smaller boxes over all parameters of one valve together, a
 be a needle in a valley of several of them. One function judges them all.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable
@@ -44,7 +42,7 @@ class Range:
     logarithmic: bool  # whether in proportion
 
     @classmethod
-    def of(cls, entry: Parameter, default: float | None) -> Range:
+    def of(cls, entry: Parameter, default: float | None) -> "Range":
         """Return the range of a parameter: its bounds, or some way round its default."""
         low, high = entry.low, entry.high
         centre = default if default is not None else 1.0

@@ -1,7 +1,5 @@
 """Grids over the friction triangle 0 ≤ f_D ≤ f_S ≤ limit, and what one simulation reveals."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

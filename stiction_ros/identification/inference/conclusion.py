@@ -1,7 +1,5 @@
 """From the final model to a result in engineering units."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which frictions the record does not reject: profile likelihood over switching patterns."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -13,8 +13,6 @@ Evidence, all under the noise model:
   paper's Remark 2).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

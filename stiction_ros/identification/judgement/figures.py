@@ -4,8 +4,6 @@ Nats are differences of log likelihood between two explanations of the same rows
 stands alone or beside a wave from outside, whichever explains more.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any

@@ -9,8 +9,6 @@ The trees stand in ``friction_probability.json``. ``stiction calibrate`` of stic
 them to simulated loops whose valves are known.
 """
 
-from __future__ import annotations
-
 import functools
 import json
 import math

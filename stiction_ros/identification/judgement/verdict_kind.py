@@ -1,7 +1,5 @@
 """What is said of a valve."""
 
-from __future__ import annotations
-
 import enum
 
 

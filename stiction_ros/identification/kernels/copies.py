@@ -4,8 +4,6 @@ An assignment of one array to a part of another compiles for two seconds, for th
 error that it raises where shapes differ. Here nobody looks at shapes.
 """
 
-from __future__ import annotations
-
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
 

@@ -1,7 +1,5 @@
 """SE at every delay: small least-squares problems, several delays side by side, compiled."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The starts of a free-run fit and the descent over A and D, compiled."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

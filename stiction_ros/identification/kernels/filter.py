@@ -1,7 +1,5 @@
 """Prefiltered stems and patterns, several side by side, and their lagged products, compiled."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Compiled: stems as sums of few steps, and the products of their lags under a given noise."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The best level of switching patterns, compiled: SE as a function of f_D and its minimum."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.compiled import compiled

@@ -7,8 +7,6 @@ everything linear. What that leaves and what its derivative needs are long rows,
 a *room* that all evaluations of a descent share, so that none of them asks for memory.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

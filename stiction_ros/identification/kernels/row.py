@@ -1,7 +1,5 @@
 """Signals through 1/A and D and their differences as rows of a matrix, compiled."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.compiled import compiled, compiled_fused

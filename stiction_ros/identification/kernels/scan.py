@@ -6,8 +6,6 @@ summed up from its end, says at every sample what a step there contributes. Prod
 with themselves are sums over moves as well where there is no prefilter, otherwise over samples.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.compiled import compiled

@@ -4,8 +4,6 @@ Between two moves OP stays in a band. Whole blocks of samples inside it are pass
 extremes of OP in them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.compiled import compiled

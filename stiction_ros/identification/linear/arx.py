@@ -1,7 +1,5 @@
 """ARX equations (9) of one output from given stems, by the one-step error."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

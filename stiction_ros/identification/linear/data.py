@@ -1,7 +1,5 @@
 """A record prepared for linear identification, and the words its results share."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 

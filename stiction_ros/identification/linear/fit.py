@@ -1,7 +1,5 @@
 """One face for the linear models of a whole record: ARX and state space."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import time

@@ -1,7 +1,5 @@
 """Orders and delays of an ARX equation by AIC or BIC of its free run, with every rival shown."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.errors import InputError

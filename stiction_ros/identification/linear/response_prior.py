@@ -8,8 +8,6 @@ differences :math:`g_i = h_i - h_{i+1}`, :math:`g_M = h_M`, the prior is a produ
 normal distributions, so the inverse of K is tridiagonal and its determinant a product.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 
@@ -95,7 +93,7 @@ class ResponsePrior:
         heights = reach.heights.tobytes()
         return _held(self.decay, self.size, self.reach, edges.tobytes(), heights, reach.unit)
 
-    def neighbours(self, *, waves: bool = False) -> list[ResponsePrior]:
+    def neighbours(self, *, waves: bool = False) -> "list[ResponsePrior]":
         """Return the members next to this one, itself included; ``waves`` changes those of it."""
         if waves:
             return [

@@ -1,7 +1,5 @@
 """A linear model of a whole record: fits, poles, gains, and the loop model made of it."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -8,8 +8,6 @@ the process of (2) with an innovation e that makes the noise part of the model. 
 it is the model that a controller unaware of friction uses, as (A.3) is.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which stretches of a record may obey an exact linear relation, compiled."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -16,8 +16,6 @@ relation and no evidence; nor where a column follows exactly from the past, as t
 noise and the process may obey an exact relation of its own.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 

@@ -3,8 +3,6 @@
 Delays are chosen channel by channel, by the exact fit under the noise model.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from collections.abc import Sequence
@@ -56,7 +54,7 @@ class Data:
     # that has no others
     further: tuple[tuple[float, ...], ...] = ()
 
-    def part(self, begin: int, end: int) -> Data:
+    def part(self, begin: int, end: int) -> "Data":
         """Return the samples from ``begin`` to before ``end``."""
         y, u = (np.ascontiguousarray(signal[:, begin:end]) for signal in (self.y, self.u))
         return dataclasses.replace(self, y=y, u=u)
@@ -81,7 +79,7 @@ class Model:
     delays: tuple[tuple[int, ...], ...]  # one tuple of m delays per output
     fits: tuple[OutputFit, ...]  # one fit per output
 
-    def beginning(self, count: int) -> Model:
+    def beginning(self, count: int) -> "Model":
         """Return the model with the first ``count`` samples of its stems."""
         return dataclasses.replace(self, stems=np.ascontiguousarray(self.stems[:, :count]))
 
@@ -106,7 +104,7 @@ class ValveScan:
     delays: FloatArray  # the best delay per output, shape (G, p)
     moves: FloatArray  # shape (G,)
 
-    def part(self, begin: int, end: int) -> ValveScan:
+    def part(self, begin: int, end: int) -> "ValveScan":
         """Return the rows from ``begin`` to before ``end``."""
         columns = (getattr(self, field.name) for field in dataclasses.fields(self))
         return ValveScan(*(column[begin:end] for column in columns))

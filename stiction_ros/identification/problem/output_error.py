@@ -11,8 +11,6 @@ A noise model with a root near one makes the level of the free run invisible. So
 is n log(Σε²/n) + n κ Σw²/Σy² with a small κ: where the free run is good it changes nothing.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,7 +1,5 @@
 """From a record to centred, scaled data and the orders that are tried."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.identification.friction.further import first_values

@@ -6,8 +6,6 @@ What does not depend on the scanned valve is projected out once; the rest is a b
 n_b × n_b systems built from lagged correlations.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -98,7 +96,7 @@ class OutputScan:
         rows = stems.offsets, stems.places, stems.values
         return least_energy(self._window, *rows, self.rest_energy)
 
-    def patterns(self, patterns: StepSignals) -> PatternEnergy:
+    def patterns(self, patterns: StepSignals) -> "PatternEnergy":
         """Return what SE of the stems base − level · sign is computed from, the two channels."""
         products, rights = step_products(
             self._window, patterns.offsets, patterns.places, patterns.values

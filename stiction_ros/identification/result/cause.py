@@ -1,7 +1,5 @@
 """What makes an output oscillate, as a value."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 

@@ -1,7 +1,5 @@
 """What identification returns: frozen values that can judge and print themselves."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import math

@@ -1,7 +1,5 @@
 """How an answer holds when the same record is looked at otherwise: at other rates, in halves."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -16,8 +16,6 @@ What happens before the first slip depends on the unknown stem position at the s
 starts either at a given level, and then slips as (4) says, or its first slip is given.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -39,7 +37,7 @@ class Beginning:
     first: int  # sample of the first slip; the length of the record when there is none
     direction: float  # +1 or −1, of the first slip; 0 when there is none
 
-    def slips_alike(self, other: Beginning) -> bool:
+    def slips_alike(self, other: "Beginning") -> bool:
         """Return whether another beginning has the same first slip, from whatever level."""
         return (self.first, self.direction) == (other.first, other.direction)
 
@@ -52,14 +50,14 @@ class Cells:
     steps: StepSignals  # base and sign as two channels
 
     @staticmethod
-    def joined(parts: list[Cells]) -> Cells:
+    def joined(parts: "list[Cells]") -> "Cells":
         """Return the cells of several lists, at least one."""
         if len(parts) == 1:
             return parts[0]
         steps = StepSignals.joined([part.steps for part in parts])
         return Cells(np.concatenate([part.bounds for part in parts]), steps)
 
-    def distinct(self) -> Cells:
+    def distinct(self) -> "Cells":
         """Return every cell once; cells do not overlap, so their lower corners tell them."""
         corners = self.bounds[:, 0] + 1j * self.bounds[:, 2]
         _, first = np.unique(corners, return_index=True)

@@ -1,7 +1,5 @@
 """Rectangles of the (J, S) plane: rows (J low, J high, S low, S high), %, shape (R, 4)."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

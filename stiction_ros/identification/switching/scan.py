@@ -1,7 +1,5 @@
 """Evaluated switching patterns: what each costs and which frictions lie in its cell."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -23,12 +21,12 @@ class PatternScan:
     moves: FloatArray  # number of stem moves, shape (G,)
 
     @staticmethod
-    def joined(parts: list[PatternScan]) -> PatternScan:
+    def joined(parts: "list[PatternScan]") -> "PatternScan":
         """Return all cells of several scans."""
         names = [field.name for field in dataclasses.fields(PatternScan)]
         return PatternScan(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
-    def chosen(self, cells: IntArray) -> PatternScan:
+    def chosen(self, cells: IntArray) -> "PatternScan":
         """Return some of the cells, by their indices."""
         names = [field.name for field in dataclasses.fields(PatternScan)]
         return PatternScan(*(getattr(self, name)[cells] for name in names))

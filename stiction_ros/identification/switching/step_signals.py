@@ -4,8 +4,6 @@ A sticky valve moves at few samples, so its stem is kept as the samples at which
 the values from there on. What costs time then grows with the moves, not with the samples.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -29,14 +27,14 @@ class StepSignals:
     values: FloatArray  # shape (R, c)
 
     @classmethod
-    def of(cls, *channels: FloatArray) -> StepSignals:
+    def of(cls, *channels: FloatArray) -> "StepSignals":
         """Return the signals of which ``channels``, shape (N, G) each, hold all samples."""
         count = len(channels[0])
         rows = np.ascontiguousarray(np.stack(channels).transpose(2, 0, 1), dtype=float)
         return cls(count, *dense_steps(rows))
 
     @classmethod
-    def joined(cls, parts: list[StepSignals]) -> StepSignals:
+    def joined(cls, parts: "list[StepSignals]") -> "StepSignals":
         """Return all signals of several lists, at least one, of equal N and c."""
         offsets, total = [np.zeros(1, dtype=np.int64)], 0
         for part in parts:
@@ -49,13 +47,13 @@ class StepSignals:
             np.concatenate([part.values for part in parts]),
         )
 
-    def part(self, begin: int, end: int) -> StepSignals:
+    def part(self, begin: int, end: int) -> "StepSignals":
         """Return the signals from ``begin`` to before ``end``."""
         rows = slice(self.offsets[begin], self.offsets[end])
         offsets = self.offsets[begin : end + 1] - self.offsets[begin]
         return StepSignals(self.count, offsets, self.places[rows], self.values[rows])
 
-    def chosen(self, signals: IntArray) -> StepSignals:
+    def chosen(self, signals: IntArray) -> "StepSignals":
         """Return some of the signals, by their indices."""
         lengths = np.diff(self.offsets)[signals]
         offsets = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(lengths)])

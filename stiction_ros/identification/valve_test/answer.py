@@ -1,7 +1,5 @@
 """The answer to the record of a test: the verdict, or the next moves."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

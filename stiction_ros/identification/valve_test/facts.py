@@ -1,7 +1,5 @@
 """What a record of a loop, or of a test, tells for the next round of the test."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

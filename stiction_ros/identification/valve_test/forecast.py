@@ -1,7 +1,5 @@
 """What further moves of OP would make of PV, by all that a test leaves possible."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -35,7 +33,7 @@ class Forecast:
     known: float  # precision of the gain, over its square, by the test so far
 
     @classmethod
-    def of(cls, judgement: Judgement, levels: Sequence[float]) -> Forecast:
+    def of(cls, judgement: Judgement, levels: Sequence[float]) -> "Forecast":
         """Return it.
 
         Args:

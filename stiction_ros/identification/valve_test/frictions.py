@@ -1,7 +1,5 @@
 """Frictions that a test may show, and the moves of the stem under each."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import itertools
@@ -44,7 +42,7 @@ class Frictions:
     ends: FloatArray  # lead of OP over the stem at the end, %, shape (G,)
 
     @classmethod
-    def all(cls, steps: Steps) -> Frictions:
+    def all(cls, steps: Steps) -> "Frictions":
         """Return coarse cells over all frictions."""
         low, high = np.log(SMALLEST), np.log(LARGEST)
         static = _middles(low, high, CELLS[0])
@@ -69,7 +67,7 @@ class Frictions:
         widths: FloatArray,
         lags: BoolArray,
         logs: FloatArray,
-    ) -> Frictions:
+    ) -> "Frictions":
         static = np.exp(middles[:, 0])
         grid = np.column_stack([static, middles[:, 1] * static])
         begin = steps.levels[0] + middles[:, 2] * static
@@ -84,11 +82,11 @@ class Frictions:
         moves, which = distinct(np.diff(stems))
         return cls(middles, widths, lags, logs, moves, which, steps.levels[-1] - stems[:, -1])
 
-    def along(self, steps: Steps) -> Frictions:
+    def along(self, steps: Steps) -> "Frictions":
         """Return the same cells on another path of OP that begins where this one does."""
         return self._at(steps, self.middles, self.widths, self.lags, self.logs)
 
-    def refined(self, steps: Steps, shares: FloatArray) -> Frictions:
+    def refined(self, steps: Steps, shares: FloatArray) -> "Frictions":
         """Return the likely cells, the likeliest of them halved in each direction.
 
         Args:

@@ -1,7 +1,5 @@
 """The verdict of a valve test."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

@@ -13,8 +13,6 @@ Stat. 90, 928), 1/σ² of the
 innovations is flat over log σ; all are integrated out, so that one number compares frictions.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any, NamedTuple
@@ -63,7 +61,7 @@ class Shape:
     noise: FloatArray  # share kept in a sample, and variance
 
     @classmethod
-    def of(cls, dynamics: Dynamics, hold: float) -> Shape:
+    def of(cls, dynamics: Dynamics, hold: float) -> "Shape":
         """Return them for a median hold of ``hold`` samples."""
         first = hold * math.exp(dynamics.lag)
         late = max(first / hold, 1.0)
@@ -109,7 +107,7 @@ class Answered:
     bend: FloatArray
 
     @classmethod
-    def of(cls, pv: FloatArray, seen: BoolArray, steps: Steps, shape: Shape) -> Answered:
+    def of(cls, pv: FloatArray, seen: BoolArray, steps: Steps, shape: Shape) -> "Answered":
         """Return them.
 
         Args:

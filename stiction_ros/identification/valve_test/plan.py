@@ -1,7 +1,5 @@
 """The steps of OP in manual that would decide on a valve, bounded in OP and PV."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any

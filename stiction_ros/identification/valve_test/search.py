@@ -1,7 +1,5 @@
 """The evidence of each hypothesis, averaged over process and noise for each by itself."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

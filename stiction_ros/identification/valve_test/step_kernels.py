@@ -1,7 +1,5 @@
 """Compiled: what a process makes of steps, and rows made white under load and noise."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.compiled import compiled

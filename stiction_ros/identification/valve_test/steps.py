@@ -1,7 +1,5 @@
 """The steps of OP in a record of a test in manual, and whether it is one."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -26,7 +24,7 @@ class Steps:
     count: int  # samples of the record
 
     @classmethod
-    def of(cls, op: FloatArray) -> Steps:
+    def of(cls, op: FloatArray) -> "Steps":
         """Return the steps of OP, shape (N,)."""
         rows = np.flatnonzero(np.diff(op) != 0.0) + 1
         return cls(rows, np.append(op[:1], op[rows]), len(op))

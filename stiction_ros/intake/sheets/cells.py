@@ -1,7 +1,5 @@
 """Cells of a column as numbers or as words, a piece at a time."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re

@@ -1,7 +1,5 @@
 """Where a table begins: delimiter, titles, header, units."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import re

@@ -1,7 +1,5 @@
 """Names of tags and columns: which loop they belong to, and which of its signals they are."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import NamedTuple

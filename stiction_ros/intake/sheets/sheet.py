@@ -1,7 +1,5 @@
 """A table in a file, read a piece at a time."""
 
-from __future__ import annotations
-
 import abc
 import contextlib
 import csv

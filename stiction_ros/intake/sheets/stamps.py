@@ -1,7 +1,5 @@
 """Cells of a column of times, in any of the forms that historians write."""
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 import enum

@@ -1,7 +1,5 @@
 """The text of a file, whatever it is packed and encoded in."""
 
-from __future__ import annotations
-
 import codecs
 import contextlib
 import gzip

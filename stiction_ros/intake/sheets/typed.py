@@ -1,7 +1,5 @@
 """Workbooks and Parquet files, by packages of the extra ``survey``."""
 
-from __future__ import annotations
-
 import contextlib
 import datetime
 import functools

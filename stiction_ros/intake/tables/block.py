@@ -1,7 +1,5 @@
 """Signals of one loop that stand beside each other in one table."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -27,7 +25,7 @@ class Key(NamedTuple):
     tag: str
 
     @classmethod
-    def of(cls, tag: Tag) -> Key:
+    def of(cls, tag: Tag) -> "Key":
         """Return the key of what a name says; a mode is of the whole loop."""
         return cls(tag.signal, "" if tag.signal == "mode" else tag.loop)
 
@@ -44,7 +42,7 @@ class Column:
     unit: str = ""  # as the export says, empty when it does not
     known: tuple[str, ...] = ()  # words of a mode, by their codes
 
-    def rows(self, chosen: NDArray[np.intp] | FlagArray) -> Column:
+    def rows(self, chosen: NDArray[np.intp] | FlagArray) -> "Column":
         """Return some of its rows."""
         return dataclasses.replace(self, values=self.values[chosen], blank=self.blank[chosen])
 
@@ -73,7 +71,7 @@ class Block:
         """The columns of all signals but the mode."""
         return self.of("op", "pv", "sp", "stem")
 
-    def with_columns(self, columns: Mapping[Key, Column]) -> Block:
+    def with_columns(self, columns: Mapping[Key, Column]) -> "Block":
         """Return the block with other columns in the place of those of the same signals."""
         return dataclasses.replace(self, columns={**self.columns, **columns})
 
@@ -82,7 +80,7 @@ class Block:
         alike = np.array_equal(self.time, times.seconds, equal_nan=True)
         return self.clock == times.clock and alike
 
-    def rows(self, chosen: NDArray[np.intp] | FlagArray) -> Block:
+    def rows(self, chosen: NDArray[np.intp] | FlagArray) -> "Block":
         """Return some of its rows."""
         return dataclasses.replace(
             self,

@@ -1,7 +1,5 @@
 """Times of a table in seconds: which column, which unit, and when to ask."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections import Counter

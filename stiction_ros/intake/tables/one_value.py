@@ -1,7 +1,5 @@
 """Tables with one value a row: told by names of columns, or by what stands in them."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Sequence

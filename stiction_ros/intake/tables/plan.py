@@ -1,7 +1,5 @@
 """What the columns of a table are: one loop, many side by side, or one value a row."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import re

@@ -1,7 +1,5 @@
 """What columns of qualities tell of the values beside them."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Collection, Sequence

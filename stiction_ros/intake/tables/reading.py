@@ -1,7 +1,5 @@
 """Reads tables into blocks of signals, one loop each."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections import Counter

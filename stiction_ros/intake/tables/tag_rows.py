@@ -1,7 +1,5 @@
 """Rows of a tag list."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A list that says which tags make up which loop, and how single files are read."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,7 +19,7 @@ class FileWay:
     """
 
     options: IntakeOptions
-    tags: TagList | None = None
+    tags: "TagList | None" = None
     units: Mapping[str, OpUnit] = dataclasses.field(default_factory=dict)
 
     def op_unit(self, loop: str, *, single: bool) -> OpUnit | None:

@@ -1,7 +1,5 @@
 """Topics as the graph shows them: types, what publishers offer, what a reader may ask for."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """What all nodes share: lifecycle, counted publishers, peers, diagnostics, configuration."""
 
-from __future__ import annotations
-
 import time
 import traceback
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """Between arrays and the messages of common_interfaces."""
 
-from __future__ import annotations
-
 import itertools
 from array import array
 from collections.abc import Iterable, Sequence
@@ -88,7 +86,7 @@ def rows_of(message: JointTrajectory, names: Sequence[str]) -> tuple[list[int], 
     return stamps, np.array([[point.positions[i] for i in picks] for point in points], dtype=float)
 
 
-def diagnosis(result: StepResult) -> list[tuple[str, object]]:
+def diagnosis(result: "StepResult") -> list[tuple[str, object]]:
     """Return what diagnostics say of the last control step."""
     gap = result.optimality_gap
     return [

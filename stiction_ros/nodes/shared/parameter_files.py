@@ -1,7 +1,5 @@
 """Parameter files named on the command line: read before ROS does, so that errors are one line."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence

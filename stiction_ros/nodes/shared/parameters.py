@@ -1,7 +1,5 @@
 """ROS parameters from settings dataclasses: declared, described, checked."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

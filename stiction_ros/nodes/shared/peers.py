@@ -1,7 +1,5 @@
 """The partners of a node: who must be there before it begins, what lacks, and who has gone."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable, Sequence
 from typing import Any

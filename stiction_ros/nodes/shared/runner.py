@@ -1,7 +1,5 @@
 """Runs one node as a process: signals, errors and the exit code."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

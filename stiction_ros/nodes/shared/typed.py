@@ -1,7 +1,5 @@
 """What rclpy leaves without types, typed: loggers, qualities of service, the end of a node."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Protocol
 

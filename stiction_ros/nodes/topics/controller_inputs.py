@@ -1,7 +1,5 @@
 """The topics that a controller reads, handed to its input port."""
 
-from __future__ import annotations
-
 import time
 from abc import abstractmethod
 from collections import deque

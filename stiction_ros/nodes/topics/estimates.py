@@ -1,7 +1,5 @@
 """How a fit is told: the message on ``stiction`` and the status in the diagnostics."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -31,7 +29,7 @@ def friction_message(stamp: int, token: str, found: Identification | None) -> Jo
     return _friction(stamp, token, {} if found is None else found.rows)
 
 
-def tested_message(stamp: int, valve: str, found: Judgement) -> JointState:
+def tested_message(stamp: int, valve: str, found: "Judgement") -> JointState:
     """Return what a valve test says of the friction of its valve.
 
     Args:

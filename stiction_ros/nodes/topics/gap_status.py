@@ -1,7 +1,5 @@
 """What the diagnostics of the estimator say of its monitor."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from stiction_ros.online.monitor.gap_finding import GapFinding

@@ -1,7 +1,5 @@
 """The controller of a running loop: steps, swaps, watches, rolls back."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections import deque

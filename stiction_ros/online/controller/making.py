@@ -1,7 +1,5 @@
 """Controllers of a running loop, made from a loop model that knows its valves."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.control import ControlDesign, ControlMode, MpcController

@@ -1,7 +1,5 @@
 """The plan of a step as the points that a message carries."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.control import MpcController, StepResult

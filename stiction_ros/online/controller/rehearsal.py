@@ -1,7 +1,5 @@
 """The first steps of a controller before it counts."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.control import ControlMode

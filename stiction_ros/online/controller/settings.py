@@ -1,7 +1,5 @@
 """The settings of the controller of a running loop."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.control import ControlMode

@@ -1,7 +1,5 @@
 """The controller of a running loop that may also test its valve."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import TYPE_CHECKING
 
@@ -57,7 +55,7 @@ class ValveTestingController(LiveController):
         return super().mode if self._running is None else ControlMode.VALVE_TEST
 
     @property
-    def _running(self) -> ValveTest | None:
+    def _running(self) -> "ValveTest | None":
         return None if self.test is None or self.test.over else self.test
 
     @property

@@ -1,7 +1,5 @@
 """A valve test in a running loop, a sample at a time."""
 
-from __future__ import annotations
-
 import math
 from concurrent.futures import Future
 

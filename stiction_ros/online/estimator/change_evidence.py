@@ -1,7 +1,5 @@
 """What a window says of frictions other than the trusted one: innovations and signatures."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -76,7 +74,7 @@ class Reference:
     outputs: tuple[OutputReference, ...]
 
     @classmethod
-    def of(cls, found: Identification, record: Record) -> Reference | None:
+    def of(cls, found: Identification, record: Record) -> "Reference | None":
         """Take process and noise from a fit of ``record``; None where it tells too little."""
         if found.stem.shape != record.op.shape or not found.outputs:
             return None

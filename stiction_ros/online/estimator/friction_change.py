@@ -1,7 +1,5 @@
 """Whether a valve that is known to stick has been serviced, or sticks more than before."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 
@@ -79,7 +77,7 @@ class LeadIn:
     pv: FloatArray  # shape (n, p)
 
     @classmethod
-    def last_of(cls, op: FloatArray, stem: FloatArray, pv: FloatArray) -> LeadIn:
+    def last_of(cls, op: FloatArray, stem: FloatArray, pv: FloatArray) -> "LeadIn":
         """Return the last samples of longer signals, as many as are of use."""
         return cls(*(signal[-2 * START_ROWS :].copy() for signal in (op, stem, pv)))
 

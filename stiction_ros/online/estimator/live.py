@@ -1,7 +1,5 @@
 """The estimator of a running loop: window in, trusted friction and loop model out."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import deque
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """When an estimate of friction is trusted, and what a later window may change."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Container, Mapping, Sequence
 from typing import Self

@@ -1,7 +1,5 @@
 """A worker process for the fits, so that nothing else waits for them."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """From where the loop is to its set-point, without a kick."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray

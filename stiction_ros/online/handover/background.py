@@ -1,7 +1,5 @@
 """Where the slow work of a live loop is done: at once, or beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Protocol, TypeVar

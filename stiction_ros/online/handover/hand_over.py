@@ -1,7 +1,5 @@
 """A controller that is made ready beside the loop, to take over between two samples."""
 
-from __future__ import annotations
-
 import dataclasses
 from concurrent.futures import Future
 

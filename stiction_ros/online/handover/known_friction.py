@@ -1,7 +1,5 @@
 """What a loop model says of the friction of its valves, and how surely."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any

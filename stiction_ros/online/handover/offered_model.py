@@ -1,7 +1,5 @@
 """Reading a loop model that comes over the network."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Whether the past speaks against a model of the friction that is offered."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """What a running loop remembers: the last samples, in arrays of a fixed size."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.control import History

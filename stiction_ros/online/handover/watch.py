@@ -1,7 +1,5 @@
 """Watching a new controller after the swap, to roll it back when it does worse."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

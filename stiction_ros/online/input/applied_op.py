@@ -1,7 +1,5 @@
 """What the valves were really given, as far as anyone tells."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.effects.behaviour import FloatArray

@@ -1,7 +1,5 @@
 """Which OP a plant or driver takes: from one commander, for the present sample, once."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from collections import Counter

@@ -1,7 +1,5 @@
 """What reaches a controller, sorted into samples by written rules."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections import Counter

@@ -1,7 +1,5 @@
 """What the state of an input port means for the health of its node."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import NamedTuple
 

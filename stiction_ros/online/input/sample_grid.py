@@ -1,7 +1,5 @@
 """Stamps and numbers of the samples of a run, and what stamps that do not fit may mean."""
 
-from __future__ import annotations
-
 from collections import deque
 
 SUCCESSION = 10  # refused stamps that rise make a new run

@@ -1,7 +1,5 @@
 """Samples as a controller works through them, and the rules by which they come about."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 

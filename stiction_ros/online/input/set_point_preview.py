@@ -1,7 +1,5 @@
 """Set-points to come."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

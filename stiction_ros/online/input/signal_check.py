@@ -1,7 +1,5 @@
 """Whether a value is one that its instrument can have measured."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the workflow says of one window: a plain function that a worker process can run."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The gap of one window of a running loop, held against that of a baseline."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """When the gap between loop and model has grown, and on which windows that is looked into."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import deque
 from collections.abc import Sequence

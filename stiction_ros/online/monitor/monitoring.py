@@ -1,7 +1,5 @@
 """The monitor with its model and its work, wherever that runs: in a node, a session, a replay."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future

@@ -1,7 +1,5 @@
 """What a replay needs of a bag: the signals in their order, the settings, what was published."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The controller of a recorded run once more: every ``op``, every change of mode."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """The estimator of a recorded run once more, from the messages that it had."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Holds what a replay gives against what was recorded, bit for bit."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """What a replay says: fits, ``op`` and changes of mode, each held against the recorded ones."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from typing import Any

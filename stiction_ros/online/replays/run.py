@@ -1,7 +1,5 @@
 """A recorded run once more without ROS, held against what was published live."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The cost (22) of a sequence of controller outputs under He's hard model (4)."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

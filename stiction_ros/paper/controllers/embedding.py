@@ -1,7 +1,5 @@
 """Stiction-embedding MPC as the paper prints it, safeguarded by the hard model."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import functools

@@ -1,7 +1,5 @@
 """Stiction inversion as the paper prints it: a purely linear MPC ahead of φ⁻¹."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

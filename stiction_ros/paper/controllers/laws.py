@@ -3,8 +3,6 @@
 A plan begins with the valve at rest, so what a moving stem would go on by itself is not planned.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The general warm start: a small dynamic optimisation of (22) under He's hard model."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 

@@ -1,7 +1,5 @@
 """The paper's stiction-embedding programme: (17)-(18) smoothed by (6), cost (22), by IPOPT."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The weights of Section 4.2 by name: as they are printed, and with the misprints mended."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 

@@ -12,8 +12,6 @@ qᵀ K q = 4AC − B²; the one with positive 4AC − B² is the ellipse.
 S_0 is the x-width: the length of the chord through the centre along OP.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 

@@ -5,8 +5,6 @@ r"""(12a) as a function of the frictions alone: the coefficients are eliminated.
 is linear least squares in θ. Past outputs and the constant are projected out once.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray

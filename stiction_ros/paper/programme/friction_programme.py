@@ -13,8 +13,6 @@ coefficients by the triangular factor of the regressors at that start, so that t
 them begins near a multiple of the identity. The Hessian is exact.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

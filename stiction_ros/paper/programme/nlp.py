@@ -11,8 +11,6 @@ of T choices of delays are spent:
 The best objective of a stable process wins.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from collections.abc import Callable, Iterator

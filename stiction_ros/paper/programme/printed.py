@@ -3,8 +3,6 @@
 The best feasible, stable end of M × T runs of IPOPT at τ = 10⁴ wins; :mod:`.nlp` uses them better.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

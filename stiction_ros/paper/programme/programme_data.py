@@ -1,7 +1,5 @@
 """Scaled data of the nonlinear programme (12), and the frame of one choice of delays."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -28,7 +26,7 @@ class ProgrammeData:
     @classmethod
     def of(
         cls, op: FloatArray, pv: FloatArray, limit: FloatArray, orders: ArxOrders, law: str = "he"
-    ) -> ProgrammeData:
+    ) -> "ProgrammeData":
         """Scale OP, shape (N, m), and centre PV, shape (N, p)."""
         mean, span, level = op.mean(axis=0), np.ptp(op, axis=0), pv.mean(axis=0)
         scaled, centred = ((op - mean) / span).T.copy(), (pv - level).T.copy()
@@ -53,7 +51,7 @@ class Frame:
     start_error: float  # (12a) at θ_0 with χ = u, squared engineering units
 
     @classmethod
-    def of(cls, data: ProgrammeData, delays: Delays) -> Frame:
+    def of(cls, data: ProgrammeData, delays: Delays) -> "Frame":
         """Compute the ARX start (15)-(16) between OP and PV, made stable, and its whitening."""
         orders = data.orders
         masks = [orders.kept(i, len(data.op)) for i in range(len(data.pv))]

@@ -8,8 +8,6 @@ V is piecewise constant in f_S at τ = 10⁴, so IPOPT is given the slope of V a
 that shrinks. The best point that was evaluated is the answer.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Where the nonlinear programme starts: border and line f_S + f_D = S_0 as printed, and inside."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 

@@ -10,8 +10,6 @@ law (5)-(6) it is the only one. Then first and second derivatives in f = (f_S, f
         + F_\chi \, \partial_{pq} \chi_{k-1}
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Turns the journals of a bag writer into a finished rosbag2 bag."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 from collections import Counter

@@ -1,7 +1,5 @@
 """Finds the definitions and hashes of ROS messages among the installed packages."""
 
-from __future__ import annotations
-
 import functools
 import json
 import os

@@ -1,7 +1,5 @@
 """Reads the messages of bags: rosbag2 directories, bare files, unfinished files."""
 
-from __future__ import annotations
-
 import bisect
 import dataclasses
 from collections import Counter

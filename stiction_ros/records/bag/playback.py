@@ -1,7 +1,5 @@
 """Which messages of a bag are due: rate, start, loop, pause and step, on a clock given to it."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import re

@@ -1,7 +1,5 @@
 """Makes a bag whole again whose writer was killed, or whose files are damaged."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import shlex

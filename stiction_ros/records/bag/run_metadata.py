@@ -3,8 +3,6 @@
 So it survives splitting, cutting and conversion. While a bag grows each record tells what is new.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterable, Mapping
 from pathlib import Path

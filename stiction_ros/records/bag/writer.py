@@ -3,8 +3,6 @@
 While it runs, ``<dir>_0.mcap`` is a journal; :func:`finish_bag` makes a finished bag of it.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -157,7 +155,7 @@ class BagWriter:
         self._journal.close()
         finish_bag(self.directory, self._packing)
 
-    def __enter__(self) -> BagWriter:
+    def __enter__(self) -> "BagWriter":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,7 +1,5 @@
 """Reads the record of a loop from a bag."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from stiction_ros.errors import InputError

@@ -4,8 +4,6 @@ Stamps are followed as *chains*: messages of both runs may stand in any order. A
 behind the end of another goes on with it after a gap; one whose stamps fall back is another run.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -32,7 +30,7 @@ class Run:
     last: int
 
     @classmethod
-    def of(cls, stamp: int, number: int) -> Run:
+    def of(cls, stamp: int, number: int) -> "Run":
         """Begin with one message."""
         return cls({stamp: number}, number, number, stamp, stamp)
 
@@ -41,7 +39,7 @@ class Run:
         self.place.setdefault(stamp, number)
         self.end, self.last = number, stamp
 
-    def append(self, other: Run) -> None:
+    def append(self, other: "Run") -> None:
         """Go on with another run behind the end of this one."""
         self.place.update(other.place)
         self.end, self.last = other.end, other.last

@@ -1,7 +1,5 @@
 """What the nodes of a live loop said besides its signals: estimates, modes, gaps, texts."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import json

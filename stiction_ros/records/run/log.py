@@ -1,7 +1,5 @@
 """What a bag of the live loop tells besides its record: estimates, modes, configuration."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

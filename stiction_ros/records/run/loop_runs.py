@@ -1,7 +1,5 @@
 """Joins the signals of a loop by stamp: runs, and records without a gap of each."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any

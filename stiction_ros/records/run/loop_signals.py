@@ -1,7 +1,5 @@
 """Collects the signals of the loops in a bag, and skips messages that nobody can use."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from typing import NamedTuple

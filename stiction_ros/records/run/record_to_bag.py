@@ -1,7 +1,5 @@
 """Writes a record as a bag of the topics ``pv``, ``op``, ``sp`` and ``stem``."""
 
-from __future__ import annotations
-
 import itertools
 import struct
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """What a bag says of its topics and of itself: QoS, topics, ``metadata.yaml``."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import Counter
 from collections.abc import Mapping, Sequence

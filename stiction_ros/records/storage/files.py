@@ -1,7 +1,5 @@
 """Which files a bag is made of, and whether ``metadata.yaml`` tells the truth of them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path

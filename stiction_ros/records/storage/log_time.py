@@ -1,7 +1,5 @@
 """The log time of a recorder: simulated where there is such a time, and never backwards."""
 
-from __future__ import annotations
-
 AGAIN = 10  # older times in succession, increasing, after which time is taken to have begun anew
 SIMULATED = "stiction_simulated_time"  # metadata record with the first simulated time
 

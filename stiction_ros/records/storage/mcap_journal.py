@@ -1,7 +1,5 @@
 """The file that a bag writer appends to while it runs: unchunked, whole after every record."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Protocol

@@ -3,8 +3,6 @@
 Unlike the readers of ``mcap`` it gives back complete messages only and compares every checksum.
 """
 
-from __future__ import annotations
-
 import os
 import struct
 import zlib

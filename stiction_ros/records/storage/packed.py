@@ -1,7 +1,5 @@
 """Storage files that are packed whole, or of another storage."""
 
-from __future__ import annotations
-
 import contextlib
 import shlex
 import tempfile

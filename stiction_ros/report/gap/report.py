@@ -1,7 +1,5 @@
 """The report of a discrepancy: the gap before and after, what names the effect, the rivals."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

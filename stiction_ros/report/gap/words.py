@@ -1,7 +1,5 @@
 """The words of the gap page: places, effects, figures and states for people."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -1,7 +1,5 @@
 """The report of one record: is it the valve, which one, how bad, and how well that fits."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The figures of a run: before and after, signals, estimates, step responses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

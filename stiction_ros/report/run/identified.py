@@ -1,7 +1,5 @@
 """What identification found, as parts of a page: verdicts, frictions, the process."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """``report.html`` of a run: what was wrong, what the swap gained, then the evidence."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -11,8 +11,6 @@ between two moves of any set-point.
   0.798 σ. With time in hours on both sides that is mean |e| − 0.798 σ, in PV units × h per h.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from collections.abc import Mapping, Sequence

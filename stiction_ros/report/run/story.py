@@ -1,7 +1,5 @@
 """What a report tells: the run, what is known of the truth, and the scores."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping

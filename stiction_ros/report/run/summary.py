@@ -1,7 +1,5 @@
 """``summary.json`` of a run: the figures that acceptance looks at."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The report of several loops on one plant: whose valve it is, and what the swap did to all."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The rows of a table that tell what the valves had to do, phase by phase."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

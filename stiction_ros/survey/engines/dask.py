@@ -3,8 +3,6 @@
 It runs whatever it is sent, so it belongs into a closed network, or behind TLS in Dask's settings.
 """
 
-from __future__ import annotations
-
 import queue
 from collections.abc import Iterable, Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Where the loops of a survey are judged: what engines have in common."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable, Iterator
 from typing import Protocol

@@ -4,8 +4,6 @@ Workers are forked from one process that has imported what they need, the first 
 that is killed is replaced and its loop tried once more. A worker gets its loop when it is ready.
 """
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import math

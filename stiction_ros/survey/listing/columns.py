@@ -1,7 +1,5 @@
 """The columns of the list: heading, what it means, and the cells of a loop."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -67,7 +65,7 @@ class Columns:
     widest: Mapping[str, float]  # end of the scale of the trends by unit of OP
 
     @classmethod
-    def of(cls, entries: Sequence[Entry], earlier: Sequence[Earlier]) -> Columns:
+    def of(cls, entries: Sequence[Entry], earlier: Sequence[Earlier]) -> "Columns":
         """Return the columns of a list with earlier surveys, the oldest first."""
         found = {entry.name: trend_of(entry, earlier) for entry in entries}
         trends = {name: trend for name, trend in found.items() if trend is not None}

@@ -1,7 +1,5 @@
 """What a survey found in a sentence or two, alike on page and console."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from stiction_ros.survey.entry import Entry, Status

@@ -1,7 +1,5 @@
 """The ranked list on one page."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from stiction_ros.pages.frame import SCROLLED, card, framed, text, words

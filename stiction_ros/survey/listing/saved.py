@@ -1,7 +1,5 @@
 """What may be done about a loop in words: what it changes of the mean |PV − SP|, or why not."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

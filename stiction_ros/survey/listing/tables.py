@@ -1,7 +1,5 @@
 """The list as CSV and XLSX, for the maintenance system."""
 
-from __future__ import annotations
-
 import csv
 import io
 import zipfile

@@ -1,7 +1,5 @@
 """The page of one loop: verdict, what helps, the signals, the notes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How the bands of loops went over earlier surveys."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Figures in words, alike on all pages."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -4,8 +4,6 @@ Both trees run as processes of their own, one after the other, and the order cha
 so that a machine which is busy now and then is so for both.
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import json

@@ -1,7 +1,5 @@
 """``stiction bench``: figures of speed, always as ratios of one run on one machine."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import os

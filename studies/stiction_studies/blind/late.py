@@ -1,7 +1,5 @@
 """Loops in which an effect sets in half-way, and what the monitor makes of them."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from typing import ClassVar

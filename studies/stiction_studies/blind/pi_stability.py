@@ -1,7 +1,5 @@
 """How near PI controllers are to the limit of stability."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects import FloatArray

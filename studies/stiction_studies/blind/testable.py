@@ -1,7 +1,5 @@
 """Whether a record shows what is hidden, by the criterion of the workflow itself."""
 
-from __future__ import annotations
-
 import math
 
 from stiction_ros.discrepancy.data.gate import open_gate

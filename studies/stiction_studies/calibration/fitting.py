@@ -1,7 +1,5 @@
 """The probability of friction fitted to figures of known loops, and how well it is calibrated."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any

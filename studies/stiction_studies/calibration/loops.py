@@ -1,7 +1,5 @@
 """The worlds of the calibration: loops by their seeds, and whether their valve has friction."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping

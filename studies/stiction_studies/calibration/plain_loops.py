@@ -5,8 +5,6 @@ Kano or Choudhury, of a stem with mass and Coulomb friction, or a deadband. Sens
 and round. Loads walk, step and swing. A valve may be stuck.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math
@@ -136,7 +134,7 @@ class _Loop:
     dynamic: float
 
     def run(
-        self, load: FloatArray, noise: FloatArray, set_point: FloatArray, sensor: Sensor
+        self, load: FloatArray, noise: FloatArray, set_point: FloatArray, sensor: "Sensor"
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return OP, stem and measured PV about their rest, shape (N,) each."""
         count, valve = len(load), _Valve(self.law, self.static, self.dynamic)

@@ -1,7 +1,5 @@
 """``stiction calibrate``: the probability of friction, fitted to loops whose truth is known."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools
@@ -58,7 +56,7 @@ def add(commands: Any) -> None:
     parser.set_defaults(run=run)
 
 
-def judged(log: Path | None, task: tuple[str, int]) -> Judged | None:
+def judged(log: Path | None, task: tuple[str, int]) -> "Judged | None":
     """Return the figures of one loop; None where its truth or the record is not clear."""
     from stiction_ros.identification import identify
     from stiction_ros.records.parts import longest_part
@@ -107,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def show(rows: list[Judged], ablate: bool) -> None:
+def show(rows: "list[Judged]", ablate: bool) -> None:
     """Print how loops are told by trees fitted to others: of all worlds, and of other worlds."""
     from stiction_ros.identification.judgement.figures import definitions
     from stiction_studies.calibration.fitting import (
@@ -145,7 +143,7 @@ def show(rows: list[Judged], ablate: bool) -> None:
         console.print(table)
 
 
-def _row_of(values: Any) -> Judged:
+def _row_of(values: Any) -> "Judged":
     from stiction_ros.identification.judgement.figures import Figures
     from stiction_studies.calibration.fitting import Judged
 

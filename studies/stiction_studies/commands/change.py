@@ -1,7 +1,5 @@
 """``stiction study-change``: a scenario whose sticky valve changes after the swap."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools
@@ -79,7 +77,7 @@ def add(commands: Any) -> None:
     parser.set_defaults(run=run)
 
 
-def _sticky(scenario: Scenario) -> int:
+def _sticky(scenario: "Scenario") -> int:
     """Return the index of the valve that changes.
 
     Raises:
@@ -91,7 +89,7 @@ def _sticky(scenario: Scenario) -> int:
     raise InputError("has no sticky valve", where=scenario.name, fix="give one law: he")
 
 
-def changed(scenario: Scenario, change: str) -> tuple[Scenario, Behaviour | None]:
+def changed(scenario: "Scenario", change: str) -> "tuple[Scenario, Behaviour | None]":
     """Return the scenario with the change, and the friction of its valve after it.
 
     Raises:
@@ -121,7 +119,7 @@ def changed(scenario: Scenario, change: str) -> tuple[Scenario, Behaviour | None
     return longer, friction
 
 
-def run_seed(scenario: Scenario, change: str, seed: int) -> Outcome:
+def run_seed(scenario: "Scenario", change: str, seed: int) -> Outcome:
     """Run one seed; a plain function, so that a worker process can run it."""
     from stiction_ros.control import ControlMode
     from stiction_ros.online.session import run_live
@@ -173,7 +171,7 @@ def _good(outcome: Outcome, change: str, friction: Behaviour | None, window: int
     return near and all(value <= QUIET for value in outcome.amplitude.values())
 
 
-def _amplitudes(live: LiveRun, scenario: Scenario, seed: int) -> dict[str, float]:
+def _amplitudes(live: "LiveRun", scenario: "Scenario", seed: int) -> dict[str, float]:
     """Return the cycle of the last round over that of the unaware controller.
 
     What comes before the swap does for this only where the swap comes late enough; the twin that
@@ -221,7 +219,7 @@ def run(options: argparse.Namespace) -> int:
     return 0 if all(outcome.good for outcome in outcomes) else 1
 
 
-def _print(scenario: Scenario, change: str, outcomes: list[Outcome]) -> None:
+def _print(scenario: "Scenario", change: str, outcomes: list[Outcome]) -> None:
     console = Console()
     table = Table(title=f"{scenario.name}, {change}", title_justify="left")
     for name in ("seed", "as asked", "noticed after", "moves", "mode", "f_S", "amplitude"):

@@ -4,8 +4,6 @@ The modules that give these words their meaning load slowly, and a mistyped opti
 at once.
 """
 
-from __future__ import annotations
-
 from stiction_ros.cli.shared.searches import METHODS
 
 COUNTED = METHODS

@@ -1,7 +1,5 @@
 """``stiction demo tank --compare``: Example 2 under five controllers, without ROS."""
 
-from __future__ import annotations
-
 import argparse
 import functools
 import os
@@ -135,7 +133,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _study(options: argparse.Namespace, plant: str) -> StudyOptions:
+def _study(options: argparse.Namespace, plant: str) -> "StudyOptions":
     from stiction_ros.paper.controllers.weights import ProgrammeCost, WarmStart, WeightPreset
     from stiction_studies.examples.control_study import StudyOptions
 

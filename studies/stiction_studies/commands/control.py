@@ -1,7 +1,5 @@
 """``stiction study-control``: the exact embedding on the tank when something is not as known."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools

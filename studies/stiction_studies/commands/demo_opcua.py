@@ -1,7 +1,5 @@
 """``stiction demo opcua``: the tank behind a control system, under the operator's grant."""
 
-from __future__ import annotations
-
 import asyncio
 import sys
 import time
@@ -66,7 +64,7 @@ def run(directory: Path, seed: int | None, speed: float | None, show: Bar) -> bo
     return bool(summary["status"] == "ok")
 
 
-def _plant(directory: Path, seed: int, speed: float) -> PlantProcess:
+def _plant(directory: Path, seed: int, speed: float) -> "PlantProcess":
     """Return the simulated plant; its clock begins now."""
     from stiction_studies.control_system.process import PlantOptions, PlantProcess
 
@@ -75,7 +73,7 @@ def _plant(directory: Path, seed: int, speed: float) -> PlantProcess:
     return PlantProcess(directory, options, USERS)
 
 
-def _nodes(directory: Path, plant: PlantProcess) -> dict[str, dict[str, Any]]:
+def _nodes(directory: Path, plant: "PlantProcess") -> dict[str, dict[str, Any]]:
     """Return the parameters of the four nodes: those of the scenario tank, and the bridge."""
     nodes = bridged_nodes(find("tank"), directory, speed=plant.options.speed)
     nodes["opcua"] = plant.node_parameters() | {
@@ -86,7 +84,7 @@ def _nodes(directory: Path, plant: PlantProcess) -> dict[str, dict[str, Any]]:
     return nodes
 
 
-async def _operate(plant: PlantProcess, processes: NodeProcesses, show: Bar) -> None:
+async def _operate(plant: "PlantProcess", processes: NodeProcesses, show: Bar) -> None:
     """Play the operator: grant it once the friction is found, take it back, watch the PIs."""
     from asyncua import ua
 
@@ -114,7 +112,7 @@ class _Operator:
     """Sees the plant's scans and the controller's log, and chooses the mode."""
 
     def __init__(
-        self, client: Client, plant: PlantProcess, processes: NodeProcesses, show: Bar
+        self, client: "Client", plant: "PlantProcess", processes: NodeProcesses, show: Bar
     ) -> None:
         self._client, self._plant = client, plant
         self._processes, self._show = processes, show

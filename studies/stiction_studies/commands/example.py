@@ -1,7 +1,5 @@
 """``stiction example``: loops whose truth is known, identified and compared with it."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools
@@ -61,7 +59,7 @@ class Choice:
     samples: int | None = None
     chosen: dict[str, Any] = dataclasses.field(default_factory=dict)
 
-    def make(self, seed: int) -> Example:
+    def make(self, seed: int) -> "Example":
         """Return the example of one seed with the orders chosen."""
         from stiction_studies.examples import example1, example2, healthy_loop
 
@@ -79,7 +77,7 @@ class Choice:
             raise InputError("needs --na as well", where="--nb")
         return dataclasses.replace(example, options=dataclasses.replace(example.options, **changes))
 
-    def identify(self, example: Example, progress: Callable[[float], None]) -> Identification:
+    def identify(self, example: "Example", progress: "Callable[[float], None]") -> "Identification":
         """Return what the search chosen finds in an example."""
         search = identify_by(self.method, example.options, self.chosen)
         return search(example.record, progress)
@@ -89,9 +87,9 @@ class Choice:
 class Outcome:
     """One seed: the example, its identification, and both side by side."""
 
-    example: Example
-    found: Identification
-    comparison: Comparison
+    example: "Example"
+    found: "Identification"
+    comparison: "Comparison"
 
     def to_dict(self) -> dict[str, Any]:
         """Return one run as JSON data."""

@@ -1,7 +1,5 @@
 """What ``stiction example`` prints: one run, or many seeds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -17,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def print_outcome(
-    console: Console, example: Example, comparison: Comparison, found: Identification
+    console: Console, example: "Example", comparison: "Comparison", found: "Identification"
 ) -> None:
     """Print true against identified of one run, the stem error and the SE."""
     title = f"{example.name}, {example.variant}, seed {example.seed}: {found.samples} samples"
@@ -58,8 +56,8 @@ def print_outcome(
 def print_study(
     console: Console,
     title: str,
-    rows: Sequence[tuple[int, Comparison, Identification]],
-    findings: Sequence[Finding],
+    rows: "Sequence[tuple[int, Comparison, Identification]]",
+    findings: "Sequence[Finding]",
 ) -> None:
     """Print one line per seed and what the seeds say together."""
     table = Table(title=title, title_justify="left")
@@ -86,7 +84,7 @@ def print_study(
         console.print(str(finding))
 
 
-def cells(against: Against, decimals: int) -> tuple[str, str, str, str]:
+def cells(against: "Against", decimals: int) -> tuple[str, str, str, str]:
     """Return true, found, error and interval as text; * marks a truth outside its interval."""
     return (
         f"{against.true:.{decimals}f}",
@@ -96,7 +94,7 @@ def cells(against: Against, decimals: int) -> tuple[str, str, str, str]:
     )
 
 
-def interval(against: Against, decimals: int) -> str:
+def interval(against: "Against", decimals: int) -> str:
     """Return the ends, with * where the truth lies outside; empty where there are none."""
     if against.interval is None:
         return ""
@@ -104,7 +102,7 @@ def interval(against: Against, decimals: int) -> str:
     return f"{low:.{decimals}f} … {high:.{decimals}f}{'' if against.inside else ' *'}"
 
 
-def true_equations(example: Example) -> dict[str, str]:
+def true_equations(example: "Example") -> dict[str, str]:
     """Return the true coefficients of each output where the process is an ARX equation."""
     process = example.truth.process
     if not isinstance(process, ArxProcess):
@@ -118,7 +116,7 @@ def equation(a: Sequence[float], b: Mapping[str, Sequence[float]]) -> str:
     return "; ".join(parts + [f"b of {valve} {numbers(values)}" for valve, values in b.items()])
 
 
-def marked(against: Against) -> str:
+def marked(against: "Against") -> str:
     """Return what was found, with * where the truth lies outside its interval."""
     return f"{against.found:.3f}{' *' if against.inside is False else ''}"
 

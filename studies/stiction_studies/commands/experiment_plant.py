@@ -1,7 +1,5 @@
 """``stiction experiment plant``: a folder of exports whose truth is known."""
 
-from __future__ import annotations
-
 import argparse
 import functools
 import sys
@@ -28,7 +26,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_jobs(parser)
 
 
-def made(seed: int, number: int) -> PlantLoop:
+def made(seed: int, number: int) -> "PlantLoop":
     """Return one loop of a plant; a worker process can run it."""
     from stiction_studies.field import field_loop
     from stiction_studies.field.exports.plant import loop_seed, plant_loop

@@ -1,7 +1,5 @@
 """What both suites of faults do with a case: keep what it left, and write its times."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``stiction faults``: faults put into a running graph, and what becomes of it."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools
@@ -99,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
     return 0 if outcomes and all(outcome.passed for outcome in outcomes) else 1
 
 
-def run_cases(cases: Sequence[Case], options: argparse.Namespace) -> list[Outcome]:
+def run_cases(cases: Sequence[Case], options: argparse.Namespace) -> "list[Outcome]":
     """Run every case, ``--jobs`` at a time; logs and bags of those that fail are kept."""
     first = int(ros_environment()["ROS_DOMAIN_ID"])
     asked = [
@@ -125,7 +123,7 @@ class _Asked:
         return f"{self.fault}-{self.pace}-{self.phase}"
 
 
-def _run(kept: Path, seed: int, speed: float, two: bool, asked: _Asked) -> Outcome:
+def _run(kept: Path, seed: int, speed: float, two: bool, asked: _Asked) -> "Outcome":
     from stiction_studies.faults.case import Options, run_case
     from stiction_studies.faults.catalogue import find
 
@@ -138,7 +136,7 @@ def _run(kept: Path, seed: int, speed: float, two: bool, asked: _Asked) -> Outco
     return outcome
 
 
-def _print(outcomes: Sequence[Outcome]) -> None:
+def _print(outcomes: "Sequence[Outcome]") -> None:
     from rich.console import Console
     from rich.table import Column, Table
 

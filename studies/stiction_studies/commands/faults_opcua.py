@@ -1,7 +1,5 @@
 """``stiction faults --opcua``: faults between a control system and its bridge."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools
@@ -55,7 +53,7 @@ class _Asked:
     domain: int
 
 
-def _run(kept: Path, seed: int, asked: _Asked) -> BridgeOutcome:
+def _run(kept: Path, seed: int, asked: _Asked) -> "BridgeOutcome":
     from stiction_studies.faults.bridge.case import run_case
     from stiction_studies.faults.bridge.catalogue import find
 
@@ -67,7 +65,7 @@ def _run(kept: Path, seed: int, asked: _Asked) -> BridgeOutcome:
     return outcome
 
 
-def _print(outcomes: Sequence[BridgeOutcome]) -> None:
+def _print(outcomes: "Sequence[BridgeOutcome]") -> None:
     from rich.console import Console
     from rich.table import Column, Table
 

@@ -1,7 +1,5 @@
 """The log of a loop that ran without ROS, as if it had been recorded."""
 
-from __future__ import annotations
-
 from stiction_ros.online.session import LiveRun
 from stiction_ros.records.run.events import Estimate, Fit, ModeChange
 from stiction_ros.records.run.log import RunLog

@@ -1,7 +1,5 @@
 """``stiction study-monitor``: the monitor over loops in which an effect sets in half-way."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools
@@ -55,14 +53,14 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def run_seed(rule: MonitorRule, healthy: bool, seed: int) -> Watched:
+def run_seed(rule: "MonitorRule", healthy: bool, seed: int) -> "Watched":
     """Run one seed; a plain function, so that a worker process can run it."""
     from stiction_studies.blind.late import late_loop, watch
 
     return watch(late_loop(seed, healthy=healthy), rule)
 
 
-def _document(one: Watched) -> dict[str, Any]:
+def _document(one: "Watched") -> dict[str, Any]:
     return {
         "seed": one.truth.seed,
         "cause": one.truth.cause,
@@ -74,7 +72,7 @@ def _document(one: Watched) -> dict[str, Any]:
     }
 
 
-def _print(outcomes: list[Watched]) -> None:
+def _print(outcomes: "list[Watched]") -> None:
     from stiction_ros.online.monitor.gap_finding import standing
 
     console = Console()

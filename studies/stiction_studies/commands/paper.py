@@ -1,7 +1,5 @@
 """``stiction paper``: the paper's figures and tables, printed numbers beside ours."""
 
-from __future__ import annotations
-
 import argparse
 import functools
 from pathlib import Path

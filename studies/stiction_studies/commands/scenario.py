@@ -1,7 +1,5 @@
 """``stiction study``: a scenario over many seeds, by the core without ROS."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools
@@ -72,7 +70,7 @@ def add(commands: Any) -> None:
     parser.set_defaults(run=run)
 
 
-def run_seed(scenario: Scenario, seed: int, *, ideal_valves: bool) -> Outcome:
+def run_seed(scenario: "Scenario", seed: int, *, ideal_valves: bool) -> Outcome:
     """Run one seed; a plain function, so that a worker process can run it."""
     from stiction_ros.online.session import run_live
     from stiction_ros.report.run.story import tell
@@ -99,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
     return 0 if swapped == (0 if options.ideal_valves else len(outcomes)) else 1
 
 
-def _sticky(scenario: Scenario) -> list[str]:
+def _sticky(scenario: "Scenario") -> list[str]:
     return [valve.name for valve in scenario.plant.valves if valve.effects]
 
 
@@ -108,7 +106,7 @@ def _ratio(outcome: Outcome, valve: str, key: str) -> float:
     return outcome.work(valve, key, "after") / before if before else float("nan")
 
 
-def _print(scenario: Scenario, outcomes: list[Outcome]) -> None:
+def _print(scenario: "Scenario", outcomes: list[Outcome]) -> None:
     console = Console()
     table = Table(title=f"{scenario.name}, {scenario.samples} samples a run", title_justify="left")
     for name in ("seed", "swap s", "valves", "delay", "output"):

@@ -1,7 +1,5 @@
 """``stiction soak``: a long run with the real nodes."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import signal
@@ -87,7 +85,7 @@ def parameters(options: argparse.Namespace, directory: Path) -> dict[str, dict[s
     return nodes
 
 
-def _soak(options: argparse.Namespace, directory: Path) -> Soaked:
+def _soak(options: argparse.Namespace, directory: Path) -> "Soaked":
     from stiction_studies.faults.soak import soak
 
     seconds = math.inf if options.hours is None else 3600.0 * options.hours
@@ -101,7 +99,7 @@ def _made(directory: Path) -> Path:
     return directory
 
 
-def _print(name: str, found: Soaked) -> None:
+def _print(name: str, found: "Soaked") -> None:
     from rich.console import Console
     from rich.table import Table
 

@@ -1,7 +1,5 @@
 """Run the simulated plant as a process: ``python -m stiction_studies.control_system FILE``."""
 
-from __future__ import annotations
-
 import asyncio
 import dataclasses
 import os

@@ -1,7 +1,5 @@
 """The control system of a simulated plant: one PI a valve, modes, watchdog, alarms."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

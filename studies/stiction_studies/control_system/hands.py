@@ -1,7 +1,5 @@
 """A session of one user of the simulated plant: the operator, or who puts faults into it."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import Mapping
@@ -58,7 +56,7 @@ class PlantHand:
             told = ua.DataValue(ua.Variant(value, self._kinds[name]))
             await client.get_node(self._nodes[name]).write_value(told)
 
-    async def _session(self) -> Client:
+    async def _session(self) -> "Client":
         from asyncua.client.ua_client import UaClientState
 
         if self._client is not None and self._client.state is not UaClientState.CONNECTED:

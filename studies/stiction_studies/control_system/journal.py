@@ -1,7 +1,5 @@
 """What the simulated plant has noted of remote operation, held against what is allowed."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections import Counter

@@ -1,7 +1,5 @@
 """The simulated plant as a process of its own: certificates, accounts, journal, clients."""
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 import json

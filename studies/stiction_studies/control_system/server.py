@@ -1,7 +1,5 @@
 """The OPC UA server of the simulated plant: tags, users and their rights, history, faults."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import dataclasses

@@ -1,7 +1,5 @@
 """The tags of the simulated plant, and the tag map that bridges it."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Loops whose truth is known: the paper's two, a coupled one, and loops without friction."""
 
-from __future__ import annotations
-
 from stiction_studies.examples.comparison import Comparison, compare
 from stiction_studies.examples.coupled import coupled_loop
 from stiction_studies.examples.example import Example

@@ -1,7 +1,5 @@
 """What was identified beside what is true."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

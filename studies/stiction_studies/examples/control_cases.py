@@ -1,7 +1,5 @@
 """The tank of Example 2 under the exact embedding, held against the loop without stiction."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 

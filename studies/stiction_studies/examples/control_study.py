@@ -1,7 +1,5 @@
 """Example 2 under the paper's three controllers, the exact embedding, and without friction."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence

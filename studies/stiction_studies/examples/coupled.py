@@ -1,7 +1,5 @@
 """A loop of one, two or three valves that act on all outputs, under one PI controller each."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One record whose truth is known."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.effects import HeStiction

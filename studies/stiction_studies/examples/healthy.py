@@ -1,7 +1,5 @@
 """Friction-free loops that oscillate for another reason: three families, random by seed."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -38,7 +36,7 @@ class _Process:
     delay: int
 
     @classmethod
-    def drawn(cls, random: np.random.Generator) -> _Process:
+    def drawn(cls, random: np.random.Generator) -> "_Process":
         """Draw a gain of 0.2 to 5 of either sign, 4 to 40 samples, a delay of 1 to 8."""
         slow = float(random.uniform(4.0, 40.0))
         size = math.exp(random.uniform(math.log(0.2), math.log(5.0)))

@@ -1,7 +1,5 @@
 """The paper's one-step criterion (14), re-evaluated for given stems, delays and orders."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The records of the paper's Examples 1 and 2 (Section 4), one per seed."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from stiction_ros.config_files import find_config

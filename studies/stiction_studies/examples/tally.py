@@ -1,7 +1,5 @@
 """Many seeds in a few sentences: how often an identification was right."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

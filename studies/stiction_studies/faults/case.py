@@ -1,7 +1,5 @@
 """One case: a loop is started, a fault put into it, and what happens is noted."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from pathlib import Path

@@ -1,7 +1,5 @@
 """All faults, by name, and the table of them that the documentation shows."""
 
-from __future__ import annotations
-
 from stiction_studies.faults.fault import Fault
 from stiction_studies.faults.kinds import (
     commanders,

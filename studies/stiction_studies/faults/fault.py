@@ -1,7 +1,5 @@
 """One fault: what is done to a running loop, and what is expected of it."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping

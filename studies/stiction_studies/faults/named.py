@@ -1,7 +1,5 @@
 """A fault by its name."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol, TypeVar
 

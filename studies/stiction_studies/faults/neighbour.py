@@ -1,7 +1,5 @@
 """A second loop in the graph: a fault in the first one never moves its OP."""
 
-from __future__ import annotations
-
 import time
 
 from stiction_studies.faults.fault import Fault, nothing

@@ -1,7 +1,5 @@
 """What was seen of a running loop while a fault was put into it."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """A long run of the nodes: what is missed, and whether memory grows."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import statistics

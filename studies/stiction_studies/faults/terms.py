@@ -1,7 +1,5 @@
 """The terms of the suite: pace, phase, what is expected of the bag and of the diagnostics."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 

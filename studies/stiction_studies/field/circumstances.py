@@ -10,8 +10,6 @@ from outside swings as much as 2 to 10 % of the valve would. Lengths are 500 to 
 mostly 700 to 2000, as historians are asked for a shift or a day.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from typing import TypeVar

@@ -1,7 +1,5 @@
 """A loop drawn under given circumstances: its numbers, and what acts on it."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """Loops of the field by their seeds."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import enum

@@ -1,7 +1,5 @@
 """What historians keep of signals, and the record that is left of a run."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

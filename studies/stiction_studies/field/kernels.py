@@ -4,8 +4,6 @@ States and parameters are flat arrays; :mod:`.valves`, :mod:`.plants` and :mod:`
 what stands where. Valves and plants are chosen by the numbers below, here and nowhere else.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

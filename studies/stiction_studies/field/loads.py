@@ -1,7 +1,5 @@
 """What acts on a loop from outside: noise, drifts, waves, set-points, hands."""
 
-from __future__ import annotations
-
 import enum
 
 import numpy as np

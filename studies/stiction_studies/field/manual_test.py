@@ -6,8 +6,6 @@ both are drawn beside a friction also where there is none. Noise is .02 to .25 o
 half a per cent of the valve; a load drifts by up to .6 %. Some PVs are rounded, some go stale.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,7 +1,5 @@
 """Plants of the field, each from published equations."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 

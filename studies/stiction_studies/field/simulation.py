@@ -1,7 +1,5 @@
 """A loop put together, and run."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -40,7 +38,7 @@ class Controller:
     weight: float = 1.0
     velocity: bool = True
 
-    def scaled(self, factor: float) -> Controller:
+    def scaled(self, factor: float) -> "Controller":
         """Return the controller with another gain."""
         return dataclasses.replace(self, gain=factor * self.gain)
 
@@ -108,7 +106,7 @@ class Signals:
     by_hand: FloatArray
 
     @staticmethod
-    def quiet(count: int, set_point: float, by_hand: float | None = None) -> Signals:
+    def quiet(count: int, set_point: float, by_hand: float | None = None) -> "Signals":
         """Return signals that nothing moves in; in manual with OP moved if that is given."""
         zeros = np.zeros(count)
         manual = np.full(count, by_hand is not None)

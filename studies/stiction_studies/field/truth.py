@@ -1,7 +1,5 @@
 """What is true of a loop of the field, found by experiment."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import itertools

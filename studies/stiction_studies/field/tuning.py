@@ -1,7 +1,5 @@
 """How plants answer steps, and controllers tuned by what they answer."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

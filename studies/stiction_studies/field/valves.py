@@ -1,7 +1,5 @@
 """Valves of the field, and what a slow triangle shows of them."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 
@@ -122,7 +120,7 @@ class Valve:
         state[0] = state[3] = position
         return state
 
-    def without_friction(self) -> Valve:
+    def without_friction(self) -> "Valve":
         """Return the same valve with nothing that holds it."""
         return dataclasses.replace(self, static=0.0, sliding=0.0)
 

@@ -1,7 +1,5 @@
 """The page of the Example 2 study: Figure 6 with two more columns, and its table."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -36,7 +34,7 @@ class PlantStudy:
     seeds: tuple[int, ...]
 
     @classmethod
-    def of(cls, trials: Sequence[Trial]) -> PlantStudy:
+    def of(cls, trials: Sequence[Trial]) -> "PlantStudy":
         """Score ``trials`` of one plant."""
         scores = tuple(score_trial(trial) for trial in trials)
         return cls(trials[0].options, trials[0], scores, tuple(trial.seed for trial in trials))

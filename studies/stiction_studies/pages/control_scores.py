@@ -1,7 +1,5 @@
 """How the controllers of the Example 2 study did: scores of one run, and means over seeds."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The report of an example: what was identified beside what is true."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

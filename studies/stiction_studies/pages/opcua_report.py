@@ -1,7 +1,5 @@
 """The report of a loop that was bridged to a control system: who had the valves, and when."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import json

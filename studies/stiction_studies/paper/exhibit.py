@@ -1,7 +1,5 @@
 """One figure or table of the paper: what it prints, and what comes out here."""
 
-from __future__ import annotations
-
 import dataclasses
 
 

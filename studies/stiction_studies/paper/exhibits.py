@@ -1,7 +1,5 @@
 """All figures and tables of the paper as one page."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import json

@@ -1,7 +1,5 @@
 """The paper's settings of its two examples, and what it prints of them."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 

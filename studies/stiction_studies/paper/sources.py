@@ -1,7 +1,5 @@
 """Records and identifications that several figures and tables share, made once when needed."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 

@@ -4,8 +4,6 @@ A run is right when every f_S and f_D, those of the healthy valve included, is w
 Runs are kept one by one, each with its seed, so that a long count can be made in pieces.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import time
@@ -93,7 +91,7 @@ class Success:
     commands: tuple[str, ...] = ()
 
     @classmethod
-    def load(cls, path: Path) -> Success:
+    def load(cls, path: Path) -> "Success":
         """Read what :meth:`save` wrote; InputError where it is something else."""
         try:
             found = json.loads(path.read_text(encoding="utf-8"))
@@ -103,7 +101,7 @@ class Success:
                 f"holds no count of the paper's examples ({error})", where=str(path)
             ) from None
 
-    def with_trials(self, trials: Iterable[Trial], command: str) -> Success:
+    def with_trials(self, trials: Iterable[Trial], command: str) -> "Success":
         """Return this with more trials; the newer of two of the same seed stays."""
         kept = {trial.key: trial for trial in (*self.trials, *trials)}
         commands = (*self.commands, *([] if command in self.commands else [command]))

@@ -1,7 +1,5 @@
 """`stiction bench … --against DIR`: two trees in turns, matched by case and subject."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

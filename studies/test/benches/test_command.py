@@ -1,7 +1,5 @@
 """`stiction bench identification`: the rows and their arithmetic, on small data."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Loops in which an effect sets in half-way."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

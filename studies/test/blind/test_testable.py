@@ -1,7 +1,5 @@
 """Testable is what the workflow's own criterion could see."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

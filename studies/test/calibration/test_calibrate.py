@@ -1,7 +1,5 @@
 """The worlds of the calibration, and the command that fits the probability to them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

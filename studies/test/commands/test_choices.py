@@ -1,7 +1,5 @@
 """The words of the options are those that the modules of the studies know."""
 
-from __future__ import annotations
-
 from stiction_ros.paper.controllers.weights import ProgrammeCost, WarmStart, WeightPreset
 from stiction_studies.blind.loops.truth import FAMILIES as BLIND
 from stiction_studies.commands import choices

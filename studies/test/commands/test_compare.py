@@ -1,7 +1,5 @@
 """`stiction demo tank --compare`: files, JSON, and options that do not fit."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

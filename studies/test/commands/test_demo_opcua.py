@@ -1,7 +1,5 @@
 """The demonstration of the bridge: its parts always, the whole of it where there is time."""
 
-from __future__ import annotations
-
 import json
 import os
 import stat

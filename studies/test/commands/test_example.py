@@ -1,7 +1,5 @@
 """`stiction example`: one seed, many seeds, what it writes and what it refuses."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

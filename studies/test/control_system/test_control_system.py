@@ -1,7 +1,5 @@
 """The control system of the simulated plant: it grants, watches, and takes over without a bump."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -31,7 +29,7 @@ class Clock:
                 self.system.write((0, 1), op)
             self.system.half_over()
 
-    def granted(self) -> Clock:
+    def granted(self) -> "Clock":
         self.run(20)
         self.system.ask(True)
         assert self.system.target(REMOTE, self.now) == ""

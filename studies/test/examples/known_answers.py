@@ -1,7 +1,5 @@
 """Identifications made by hand, so that tests of examples need no search."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """True against identified, and what many seeds say together."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 

@@ -1,7 +1,5 @@
 """The runs of `stiction demo tank --compare`, short ones."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

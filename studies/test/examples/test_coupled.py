@@ -1,7 +1,5 @@
 """The coupled loop of one to three valves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Loops without friction: ideal valves, real oscillations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

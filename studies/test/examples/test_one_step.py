@@ -1,7 +1,5 @@
 """The one-step criterion (14) for given stems."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The records of Examples 1 and 2."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Made-up observations of a loop, good until a test spoils them."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

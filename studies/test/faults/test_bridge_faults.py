@@ -1,7 +1,5 @@
 """The faults between control system and bridge: their verdicts, their table, and one of them."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Every fault has a row in the documentation, and the rows are those of the code."""
 
-from __future__ import annotations
-
 import inspect
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What a long run is judged by."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """Loops of the field: what a seed gives."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What historians do to signals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

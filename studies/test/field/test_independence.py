@@ -1,7 +1,5 @@
 """The field shares no model with what is judged by it."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

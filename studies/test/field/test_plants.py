@@ -1,7 +1,5 @@
 """Plants of the field: at rest, stepped, tuned."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

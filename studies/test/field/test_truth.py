@@ -1,7 +1,5 @@
 """How slips, turns, regularity and causes are read."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

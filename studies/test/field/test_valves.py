@@ -1,7 +1,5 @@
 """Valves of the field: their laws, and what a slow triangle shows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings

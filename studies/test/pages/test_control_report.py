@@ -1,7 +1,5 @@
 """Scores and page of the Example 2 study, on made-up signals with known scores."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from pathlib import Path

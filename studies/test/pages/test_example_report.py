@@ -1,7 +1,5 @@
 """The report of an example."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from pathlib import Path

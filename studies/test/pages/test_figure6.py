@@ -1,7 +1,5 @@
 """Figure 6 in figures: who cycles and who does not, on the linear plant (A.3)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """Who had the valves, and how OP went over from one to the other."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

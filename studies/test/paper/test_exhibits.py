@@ -1,7 +1,5 @@
 """The page of figures and tables, and the misprints that it tells."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Counts of right answers, kept run by run."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What is no name: figures that hold nothing out."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any, cast
 

@@ -1,7 +1,5 @@
 """Why an effect was chosen, in one sentence."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any, cast
 

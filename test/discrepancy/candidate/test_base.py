@@ -1,7 +1,5 @@
 """What all candidates share: coordinates of the search, and points apart from each other."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

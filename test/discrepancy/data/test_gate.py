@@ -1,7 +1,5 @@
 """What the recorded values show before any model is asked."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Loops of the world of others that were answered wrongly once; the principle that answers them."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

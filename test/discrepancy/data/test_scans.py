@@ -1,7 +1,5 @@
 """A controller that scans twice in a sample of the record."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

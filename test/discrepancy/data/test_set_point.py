@@ -1,7 +1,5 @@
 """Set-points that no record holds, and the law that tells them."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

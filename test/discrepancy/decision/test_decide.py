@@ -1,7 +1,5 @@
 """What scores allow to say."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which rows are kept back."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The free run as a reader sees it."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

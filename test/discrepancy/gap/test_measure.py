@@ -1,7 +1,5 @@
 """The share of a gap that an effect closes."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any, cast
 

@@ -1,7 +1,5 @@
 """The declared noise as a form of its own, and what is larger than it as a named effect."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

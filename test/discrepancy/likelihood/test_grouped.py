@@ -1,7 +1,5 @@
 """Rounded values: each tells only in which step of the lattice it lies."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from gap_loops import loop, record

@@ -1,7 +1,5 @@
 """The likelihood of a gap under autoregressive noise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

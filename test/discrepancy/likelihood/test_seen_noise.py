@@ -1,7 +1,5 @@
 """Noise of an OP that is not all that acted, behind the process and beside the declared noise."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """White noise beside a first-order one."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, Blocks, fit_noise

@@ -1,7 +1,5 @@
 """Noise by its states, judged from the first sample of a record on."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

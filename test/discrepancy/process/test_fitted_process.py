@@ -1,7 +1,5 @@
 """Effects named without a model: the process is identified from the same records."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

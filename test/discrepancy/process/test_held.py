@@ -1,7 +1,5 @@
 """Sampled equations as continuous plants behind a held stem."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A process that is another than the model is named by its own figures."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A free run of the right model leaves no gap but what is projected out."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

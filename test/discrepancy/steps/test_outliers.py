@@ -1,7 +1,5 @@
 """Steps that another one takes back."""
 
-from __future__ import annotations
-
 import types
 from typing import Any, cast
 

@@ -1,7 +1,5 @@
 """What an undecided answer says would decide."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 

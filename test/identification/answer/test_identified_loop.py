@@ -1,7 +1,5 @@
 """The identified loop as a loop model: written, read, simulated, held against its record."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 

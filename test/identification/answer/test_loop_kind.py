@@ -1,7 +1,5 @@
 """What is known of a kind of loop, held against the process that was found."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """An identification as it shows itself."""
 
-from __future__ import annotations
-
 import dataclasses
 import io
 

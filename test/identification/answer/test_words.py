@@ -1,7 +1,5 @@
 """The answer in plain sentences."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simulated loops, their controller, process and friction known, as identification tells them."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """With which frictions a loop is run again."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Small records whose truth is known, made here and nowhere else."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Where what a record does not reject ends."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from evidence_loops import pi_loop

@@ -1,7 +1,5 @@
 """Each valve's own law: told where the record tells it, He's where it does not."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the controller tells of the process, and what that does to the evidence."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

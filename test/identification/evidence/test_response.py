@@ -1,7 +1,5 @@
 """A PV that does not answer its valve is told as such."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

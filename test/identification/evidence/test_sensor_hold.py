@@ -1,7 +1,5 @@
 """A sensor that repeats its value is not taken for a stem that rests."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What lies between samples, and what it leaves open of a friction."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

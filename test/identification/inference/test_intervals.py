@@ -1,7 +1,5 @@
 """Intervals of friction: what they hold, and how they grow."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import simulated_loops as loops

@@ -1,7 +1,5 @@
 """Verdicts and intervals of the default search, as tables."""
 
-from __future__ import annotations
-
 import pytest
 import simulated_loops as loops
 from hypothesis import given

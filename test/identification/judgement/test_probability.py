@@ -1,7 +1,5 @@
 """The figures behind a verdict, the probability that they give, and the cuts through it."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """ARX equations that are known."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import linear_systems as systems

@@ -1,7 +1,5 @@
 """One face for ARX and state space; the experiment of Appendix A."""
 
-from __future__ import annotations
-
 import functools
 import json
 

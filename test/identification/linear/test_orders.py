@@ -1,7 +1,5 @@
 """Orders and delays that are chosen, and the table of their rivals."""
 
-from __future__ import annotations
-
 import linear_systems as systems
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """State-space models of systems that are known."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import linear_systems as systems

@@ -1,7 +1,5 @@
 """OP and PV swapped in a record: found when clear, never seen where they are not."""
 
-from __future__ import annotations
-
 import dataclasses
 import pathlib
 

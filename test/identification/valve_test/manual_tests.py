@@ -1,7 +1,5 @@
 """Simulated tests in manual: steps of OP, a valve, a lag or a level, noise and a drifting load."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The cells of frictions: their prior, and the moves of the stem under each."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st

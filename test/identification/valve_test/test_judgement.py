@@ -1,7 +1,5 @@
 """Verdicts on simulated tests."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from manual_tests import answer, path

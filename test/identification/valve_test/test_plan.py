@@ -1,7 +1,5 @@
 """Rounds of a test: their size, their order and their limits."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

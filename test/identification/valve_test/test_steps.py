@@ -1,7 +1,5 @@
 """A test in manual is told from a loop in automatic: there OP answers PV."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """What all nodes share, tried on a small node of its own."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path

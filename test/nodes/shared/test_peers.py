@@ -1,7 +1,5 @@
 """Publishers and subscriptions that know whom they serve."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Nodes as single processes: unusable input is one line, an interrupt waits for nothing."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import signal

@@ -1,7 +1,5 @@
 """The controller node among messages that come late, wrong, or not at all."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """A valve test in a running loop: what ends it, and who has OP then."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.online.input.applied_op import KEPT, SILENT, AppliedOp

@@ -1,7 +1,5 @@
 """Which OP is taken, as a table."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -4,8 +4,6 @@ A sample is written as a word: its stamp in seconds, after ``^`` when a run begi
 ``+`` when it is answered and ``-`` when it is passed over, then ``?`` when its PV is NaN.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.online.input.set_point_preview import SetPointPreview

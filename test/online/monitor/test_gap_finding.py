@@ -1,7 +1,5 @@
 """What is said of a window that was looked into."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import pickle

@@ -1,7 +1,5 @@
 """The figures by which a window is held against the baseline."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """When the gap counts as grown, and which windows are looked into."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 from pathlib import Path

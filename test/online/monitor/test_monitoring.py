@@ -1,7 +1,5 @@
 """Which model is compared, and what becomes of windows that are looked into."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 from concurrent.futures import Future

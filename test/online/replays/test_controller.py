@@ -1,7 +1,5 @@
 """The controller of a recorded run is told what the node was told."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

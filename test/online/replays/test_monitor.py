@@ -1,7 +1,5 @@
 """A replay gives again what the monitor told, and says so when it does not."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import sys

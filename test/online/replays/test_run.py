@@ -1,7 +1,5 @@
 """A replay gives the numbers of the live run, and says so when it does not."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 from collections.abc import Callable, Iterator

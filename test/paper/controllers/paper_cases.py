@@ -1,7 +1,5 @@
 """Small sticky loops for the tests of the paper's own formulations."""
 
-from __future__ import annotations
-
 import numpy as np
 from loops import stable_model, target_at
 

@@ -1,7 +1,5 @@
 """Bags that were cut or altered: what is whole comes back, or one clear error does."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from pathlib import Path

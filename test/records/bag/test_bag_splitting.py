@@ -1,7 +1,5 @@
 """Bags in several files: written, killed, finished, read here and by others."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Readers that nobody here wrote find the same in our bags, and we the same in others'."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

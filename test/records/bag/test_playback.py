@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import dataclasses
 import tempfile
 from collections.abc import Sequence

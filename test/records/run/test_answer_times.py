@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import types
 
 from stiction_ros.records.bag.messages import BagMessage

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import math
 
 from bag_making import JOINT_STATE, SECOND, Bag, clock, joint_state

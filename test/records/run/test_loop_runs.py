@@ -1,7 +1,5 @@
 """The law of the bag reader: what it calls good was sent, for that sample, by that run."""
 
-from __future__ import annotations
-
 import types
 from collections.abc import Iterator
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """A bag that holds two loops: every command names them, and reads the one that is chosen."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

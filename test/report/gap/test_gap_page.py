@@ -1,7 +1,5 @@
 """The page of a discrepancy, for someone who has not read the paper."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

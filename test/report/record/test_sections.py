@@ -1,7 +1,5 @@
 """The sections of words, from answers that are made up."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A run that was cut is judged by the schedule that its plant announced."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What ``identify`` says of one valve, as far as it is judged."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from collections.abc import Callable, Mapping, Sequence

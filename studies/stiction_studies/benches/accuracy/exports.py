@@ -1,7 +1,5 @@
 """``stiction bench exports``: one loop written as many random exports, read, and compared."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import enum

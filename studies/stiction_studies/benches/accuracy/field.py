@@ -1,7 +1,5 @@
 """``stiction bench field``: identification over loops that share nothing with it, counted."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools
@@ -154,7 +152,7 @@ def judge(method: str, oracle: bool, seed: int) -> Judged:
     )
 
 
-def _shown(found: FieldLoop) -> float | None:
+def _shown(found: "FieldLoop") -> float | None:
     """Return what the true stem of a loop gains beyond the price; None where it is refused."""
     from stiction_studies.benches.accuracy.known_stem import beyond_price
     from stiction_studies.field import with_friction

@@ -1,7 +1,5 @@
 """``stiction bench gain``: what gain promises against what the field's simulators then do."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 from collections.abc import Sequence

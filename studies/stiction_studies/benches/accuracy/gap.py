@@ -1,7 +1,5 @@
 """``stiction bench gap``: the discrepancy workflow over blind loops, and its matrix."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools
@@ -106,7 +104,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def judge(family: str, seed: int, full: bool) -> Scored:
+def judge(family: str, seed: int, full: bool) -> "Scored":
     """Run the workflow on one blind loop and compare; it sees model and record alone."""
     from stiction_ros.discrepancy import GapOptions, find_discrepancy
     from stiction_studies.blind.loops.generator import blind_loop
@@ -119,7 +117,7 @@ def judge(family: str, seed: int, full: bool) -> Scored:
 
 
 def judge_all(
-    cases: list[tuple[str, int]], full: bool, jobs: int, keep: Callable[[Scored], None]
+    cases: list[tuple[str, int]], full: bool, jobs: int, keep: "Callable[[Scored], None]"
 ) -> None:
     """Judge loops in worker processes and hand over every row as it comes."""
     if not cases:
@@ -140,7 +138,7 @@ def judge_all(
             raise
 
 
-def read_log(path: Path, bench: GapBench) -> dict[tuple[str, int], Scored]:
+def read_log(path: Path, bench: GapBench) -> "dict[tuple[str, int], Scored]":
     """Return the rows of ``bench`` that the log has.
 
     Raises:
@@ -162,7 +160,7 @@ def write_loops(bench: GapBench, folder: Path) -> None:
         write_blind_loop(seed, family, seen, folder / "answers")
 
 
-def show(rows: Iterable[Scored]) -> None:
+def show(rows: "Iterable[Scored]") -> None:
     """Print the matrix and the rates."""
     from stiction_studies.blind.scores.tally import coverage, matrix, median_closed, rates
 
@@ -173,7 +171,7 @@ def show(rows: Iterable[Scored]) -> None:
     console.print(f"closed by what was right, median: {median_closed(rows):.3f} (>= 0.9)")
 
 
-def _keep(rows: dict[tuple[str, int], Scored], log: Path, full: bool, row: Scored) -> None:
+def _keep(rows: "dict[tuple[str, int], Scored]", log: Path, full: bool, row: "Scored") -> None:
     rows[row.family, row.seed] = row
     with log.open("a", encoding="utf-8") as file:
         file.write(json.dumps({"full": full} | row.to_mapping()) + "\n")
@@ -192,7 +190,7 @@ def _by_count(entry: tuple[str, int]) -> tuple[int, str]:
     return -entry[1], entry[0]
 
 
-def rate_table(found: list[Rate]) -> Table:
+def rate_table(found: "list[Rate]") -> Table:
     """Return rates with what is wanted of them."""
     table = Table("rate", "count", "of", "share", "wanted")
     for rate in found:

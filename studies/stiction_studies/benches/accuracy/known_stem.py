@@ -5,8 +5,6 @@ moved gains less than what a search must ask of the best of its many frictions, 
 show that there is one; no rule that lets healthy loops in peace can find it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray

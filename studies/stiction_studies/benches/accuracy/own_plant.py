@@ -1,7 +1,5 @@
 """``stiction bench own``: first-order plants as a new user writes them, under default settings."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 from collections.abc import Sequence
@@ -49,7 +47,7 @@ class OwnPlant:
     levels: FloatArray = dataclasses.field(repr=False)
 
     @classmethod
-    def drawn(cls, seed: int) -> OwnPlant:
+    def drawn(cls, seed: int) -> "OwnPlant":
         """Draw a plant; gains, times, frictions and noises are as likely in each decade."""
         random = np.random.default_rng(seed)
         gain = float(10.0 ** random.uniform(-1.0, 1.0) * random.choice([-1.0, 1.0]))

@@ -1,7 +1,5 @@
 """``stiction bench plant``: the list of a survey against what is true of a made plant."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import json

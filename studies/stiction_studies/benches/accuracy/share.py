@@ -1,7 +1,5 @@
 """Rates that something is held to."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable
 

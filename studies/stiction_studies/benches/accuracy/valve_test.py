@@ -1,7 +1,5 @@
 """``stiction bench valve-test``: tests in manual of simulated valves, counted."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import math

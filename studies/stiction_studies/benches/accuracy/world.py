@@ -1,7 +1,5 @@
 """``stiction bench world``: the discrepancy workflow over loops that share nothing with it."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools
@@ -107,7 +105,7 @@ def run(options: argparse.Namespace, machine: str) -> int:
     return 0
 
 
-def judge(full: bool, log: Path, case: Case) -> WorldScore:
+def judge(full: bool, log: Path, case: Case) -> "WorldScore":
     """Run the workflow on one loop and compare; it sees model and record alone."""
     from stiction_ros.discrepancy import GapOptions, find_discrepancy
     from stiction_ros.loop import LoopModel
@@ -152,7 +150,7 @@ def write_loops(bench: WorldBench, folder: Path) -> None:
             (answers / f"{name}.json").write_text(json_text(answer) + "\n", encoding="utf-8")
 
 
-def show(rows: Sequence[WorldScore]) -> None:
+def show(rows: "Sequence[WorldScore]") -> None:
     """Print the matrix and the rates of every family and kind of model."""
     from stiction_studies.blind.scores.tally import matrix
     from stiction_studies.blind.scores.world_tally import median_closed, rates, seconds
@@ -172,7 +170,7 @@ def show(rows: Sequence[WorldScore]) -> None:
         )
 
 
-def _split_table(rows: Sequence[WorldScore]) -> Table:
+def _split_table(rows: "Sequence[WorldScore]") -> Table:
     """Return what is wrong and right by plant and circumstance."""
     from stiction_studies.blind.scores.world_tally import TESTABLE, splits
 
@@ -184,7 +182,7 @@ def _split_table(rows: Sequence[WorldScore]) -> Table:
     return table
 
 
-def _misses(rows: Sequence[WorldScore]) -> Table:
+def _misses(rows: "Sequence[WorldScore]") -> Table:
     """Return the loops in which something is said that is not there, or nothing at all."""
     table = Table("seed", "hidden", "said", "oracle", "plant and circumstances")
     for row in rows:
@@ -195,7 +193,7 @@ def _misses(rows: Sequence[WorldScore]) -> Table:
     return table
 
 
-def _read_log(log: Path, bench: WorldBench) -> dict[Case, WorldScore]:
+def _read_log(log: Path, bench: WorldBench) -> "dict[Case, WorldScore]":
     """Return the rows of ``bench`` that the log has."""
     from stiction_studies.blind.scores.world_scores import WorldScore
 

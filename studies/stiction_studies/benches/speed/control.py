@@ -3,8 +3,6 @@
 Problems are taken from the recorded limit cycle of a loop; all methods of a row solve the same.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import time

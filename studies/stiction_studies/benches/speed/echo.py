@@ -1,7 +1,5 @@
 """A bare echo between two processes: the yardstick of ``stiction bench graph``."""
 
-from __future__ import annotations
-
 import json
 import signal
 import sys

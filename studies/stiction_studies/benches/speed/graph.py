@@ -1,7 +1,5 @@
 """``stiction bench graph``: a lockstep sample of the nodes against a bare echo."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

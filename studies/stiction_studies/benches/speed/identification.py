@@ -3,8 +3,6 @@
 All rows of one run work on the same records, one after another in one process.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from collections.abc import Callable, Sequence

@@ -4,8 +4,6 @@ Times are of the processor, ms for a thousand messages: a bag is only written wh
 control.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """A talker, and the barest of recorders: the yardstick of ``stiction bench record``."""
 
-from __future__ import annotations
-
 import signal
 import sys
 import time

@@ -1,7 +1,5 @@
 """One row of a benchmark."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Healthy loops of several processes under PI control, random by seed."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable
@@ -38,7 +36,7 @@ class BaseLoop:
     slow: FloatArray
     delays: FloatArray
 
-    def with_tunings(self, tunings: tuple[PiTuning, ...]) -> BaseLoop:
+    def with_tunings(self, tunings: tuple[PiTuning, ...]) -> "BaseLoop":
         """Return the same loop under other controllers."""
         return dataclasses.replace(self, tunings=tunings)
 

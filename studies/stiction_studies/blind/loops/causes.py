@@ -1,7 +1,5 @@
 """Effects that can be hidden, with sizes drawn above and around what matters in a plant."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,7 +1,5 @@
 """Noise and set-points of a blind loop."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

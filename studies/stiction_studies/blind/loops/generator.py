@@ -1,7 +1,5 @@
 """Blind loops: what the workflow sees, and the answer that it does not."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Changes that the catalogue does not hold: a gain that changes, a fouling or leaking tank."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is hidden in a blind loop, kept apart from what the workflow sees."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Which effects no record of OP and PV can tell from each other."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.loop import LoopModel

@@ -1,7 +1,5 @@
 """The score of one answer: what was hidden against what was said."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import math
@@ -86,7 +84,7 @@ class Scored:
         return values
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> Scored:
+    def from_mapping(cls, values: Mapping[str, Any]) -> "Scored":
         """Read what :meth:`to_mapping` wrote."""
         closed = math.nan if values["closed"] is None else float(values["closed"])
         return cls(**{**values, "score": Score(values["score"]), "closed": closed})

@@ -1,7 +1,5 @@
 """Rates over many blind loops, and the matrix of what was hidden and what was said."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections import Counter

@@ -1,7 +1,5 @@
 """The score of one answer about a loop of the field in which something is hidden."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping
@@ -85,7 +83,7 @@ class WorldScore:
         return values
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> WorldScore:
+    def from_mapping(cls, values: Mapping[str, Any]) -> "WorldScore":
         """Read what :meth:`to_mapping` wrote."""
         closed = math.nan if values["closed"] is None else float(values["closed"])
         lists = {key: tuple(values[key]) for key in ("circumstances", "wrong", "oracle")}

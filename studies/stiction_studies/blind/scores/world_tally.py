@@ -1,7 +1,5 @@
 """Rates over many loops of the field with something hidden in them."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

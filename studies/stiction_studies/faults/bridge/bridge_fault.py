@@ -1,7 +1,5 @@
 """One fault between a control system and its bridge, and what is expected of it."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -12,7 +10,7 @@ if TYPE_CHECKING:
 NOTICED_WITHIN = 3.0  # s
 
 
-def nothing(_loop: BridgedLoop) -> None:
+def nothing(_loop: "BridgedLoop") -> None:
     """Do nothing."""
 
 
@@ -34,9 +32,9 @@ class BridgeFault:
 
     name: str
     expected: str
-    put: Callable[[BridgedLoop], None]
+    put: "Callable[[BridgedLoop], None]"
     shown: str
-    mend: Callable[[BridgedLoop], None] = nothing
+    mend: "Callable[[BridgedLoop], None]" = nothing
     by: str = "opcua"
     within: float = NOTICED_WITHIN
     taken_over: bool = True

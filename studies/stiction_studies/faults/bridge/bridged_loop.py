@@ -1,7 +1,5 @@
 """A bridged loop that faults are put into: plant, relay, bridge, controller, recorder."""
 
-from __future__ import annotations
-
 import datetime
 import shutil
 import time

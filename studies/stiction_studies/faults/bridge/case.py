@@ -1,7 +1,5 @@
 """One case: a bridged loop under control, a fault, control once more; and the verdict."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re

@@ -1,7 +1,5 @@
 """The faults between a control system and its bridge, and the table of them."""
 
-from __future__ import annotations
-
 import signal
 import time
 from collections.abc import Callable

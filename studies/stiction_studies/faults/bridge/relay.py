@@ -1,7 +1,5 @@
 """A relay between client and server that can be cut."""
 
-from __future__ import annotations
-
 import contextlib
 import select
 import socket

@@ -1,7 +1,5 @@
 """Whether the bag of a case holds what was seen, and can be read."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """How OP has flowed: moves, new values, gaps, the return to normal."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """Holds what was seen of a case against what is expected."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """When a diagnostic has shown a fault, and when it was gone again."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Others who send OP."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from stiction_studies.faults.fault import Fault

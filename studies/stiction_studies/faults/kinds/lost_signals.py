@@ -1,7 +1,5 @@
 """Messages of the loop that are lost, late, changed or exchanged on their way."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

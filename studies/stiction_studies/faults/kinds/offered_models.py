@@ -1,7 +1,5 @@
 """Loop models that nobody should take."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 from collections.abc import Callable, Iterator

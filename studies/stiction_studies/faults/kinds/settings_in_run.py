@@ -1,7 +1,5 @@
 """Parameters that change in mid-run, clocks, orders of starting, and storage."""
 
-from __future__ import annotations
-
 import math
 import resource
 import shutil

@@ -1,7 +1,5 @@
 """Messages on the topics of the loop that should not be there."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

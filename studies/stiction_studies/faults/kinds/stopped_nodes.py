@@ -1,7 +1,5 @@
 """Nodes that stand still, die, come back."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

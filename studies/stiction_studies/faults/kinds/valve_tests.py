@@ -1,7 +1,5 @@
 """What comes between a valve test: the former mode is in force again, without a bump."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """The suite's own node: hears what the loop says, and says what it should not have to hear."""
 
-from __future__ import annotations
-
 import functools
 import os
 import threading

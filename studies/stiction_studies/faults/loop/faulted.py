@@ -1,7 +1,5 @@
 """What every loop has that faults are put into: nodes, the suite's own node, remarks, patience."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -30,7 +28,7 @@ class FaultedLoop:
     """
 
     nodes: dict[str, NodeProcess]
-    probe: Probe
+    probe: "Probe"
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory

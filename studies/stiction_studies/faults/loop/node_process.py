@@ -1,7 +1,5 @@
 """One node as a process that can be paused, killed and started again."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

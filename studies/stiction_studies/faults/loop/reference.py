@@ -5,8 +5,6 @@ graph bit for bit, over two rounds of the set-point schedule. Before the swap a 
 against the unaware controller, afterwards against the run with the swap in it.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 

@@ -1,7 +1,5 @@
 """What becomes of the messages that go through a relay."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

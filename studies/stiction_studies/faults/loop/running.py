@@ -1,7 +1,5 @@
 """A running loop that faults are put into: its processes, and the suite's own node."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The loop that the faults are put into, and the parameters of its nodes."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Mapping
 from pathlib import Path
@@ -24,7 +22,7 @@ SETTLING = 40  # samples after the swap
 
 
 @functools.cache
-def scenario() -> Scenario:
+def scenario() -> "Scenario":
     """Return the scenario of the suite."""
     from stiction_ros.online.session import Scenario
 

@@ -1,7 +1,5 @@
 """The loop of a seed run again: another valve, another tuning, another controller."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 
@@ -56,7 +54,7 @@ class Again:
     offset: float
 
     @classmethod
-    def of(cls, seed: int) -> Again:
+    def of(cls, seed: int) -> "Again":
         """Return the loop of a seed."""
         circumstances: Circumstances = draw_circumstances(np.random.default_rng([seed, 0]))
         made, loop = drawn(seed)

@@ -1,7 +1,5 @@
 """Five forms of an export: a file a loop, loops side by side, a value a row, Parquet, workbooks."""
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import datetime

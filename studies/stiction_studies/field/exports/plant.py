@@ -1,7 +1,5 @@
 """A made plant: loops of the field by their seeds, exported in five forms, and the truth."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from collections import defaultdict

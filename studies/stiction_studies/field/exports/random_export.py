@@ -3,8 +3,6 @@
 Shape, clock, language, quality, unit of OP and jitter of the stamps are drawn independently.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 import itertools

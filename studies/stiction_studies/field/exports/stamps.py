@@ -1,7 +1,5 @@
 """How exports write the time of a row."""
 
-from __future__ import annotations
-
 import datetime
 import enum
 

@@ -1,7 +1,5 @@
 """One loop as an export shows it: rows of cells, with what goes wrong in them."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -50,7 +48,7 @@ class Table:
     faults: tuple[str, ...]
     reported: bool
 
-    def rows(self, order: list[int]) -> Table:
+    def rows(self, order: list[int]) -> "Table":
         """Return some rows in some order."""
         cells = {name: [column[k] for k in order] for name, column in self.cells.items()}
         return dataclasses.replace(self, time=self.time[order], cells=cells)

@@ -1,7 +1,5 @@
 """One thing that is hidden: where it acts, what it is called, and its figures."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 

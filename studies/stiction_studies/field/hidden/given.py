@@ -1,7 +1,5 @@
 """The loop model that a plant would have, as the mapping of its YAML."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Loops with something hidden in them, by their seeds."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

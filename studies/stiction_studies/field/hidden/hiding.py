@@ -4,8 +4,6 @@ Sizes are such as matter in a plant: friction of 2 to 12 % of travel, loads wort
 the valve, lags about as long as the plant's own. A quarter of the loops has half of that.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 The stem's friction is stepped by the kernels of the field, with which this file shares a folder.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

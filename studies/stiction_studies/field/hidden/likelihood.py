@@ -1,7 +1,5 @@
 """The likelihood of what a simulation leaves of PV, under noise of its true form."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -37,7 +35,7 @@ class Form:
     white: float
     start: FloatArray
 
-    def beside(self, other: Form) -> Form:
+    def beside(self, other: "Form") -> "Form":
         """Return the sum of two noises that know nothing of each other."""
         return Form(
             np.ascontiguousarray(block_diag(self.f, other.f)),

@@ -4,8 +4,6 @@ The true effect, and every other one of the catalogue, is fitted at its place by
 likelihood over all rows, in the simulation that made the loop, under the recorded OP.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

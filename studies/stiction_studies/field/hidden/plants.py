@@ -1,7 +1,5 @@
 """Linear plants from published equations, in continuous time."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

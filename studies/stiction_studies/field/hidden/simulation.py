@@ -1,7 +1,5 @@
 """A loop with what is hidden in it, put together and run."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterable

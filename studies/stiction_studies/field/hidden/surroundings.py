@@ -4,8 +4,6 @@ Most are as an engineer would like them; each of the others comes in a tenth or 
 what is hidden has to be told from them.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """PI controllers for the plants, and gains near the limit of stability."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """Figure 6: the three formulations of MPC on Example 2, on both plants."""
 
-from __future__ import annotations
-
 from stiction_studies.examples.control_study import COLUMNS, StudyOptions, run_trial
 from stiction_studies.pages.control_report import PLANT_TITLES, PlantStudy, figures_of
 from stiction_studies.paper.exhibit import Exhibit, Row

@@ -1,7 +1,5 @@
 """Figures 2 and 5: unit step responses of the actual and the identified process."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

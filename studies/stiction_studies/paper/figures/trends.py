@@ -1,7 +1,5 @@
 """Figure 3: measured and estimated time trends of Example 1."""
 
-from __future__ import annotations
-
 from stiction_studies.examples import compare
 from stiction_studies.pages.example_report import trends
 from stiction_studies.paper.exhibit import Exhibit, Row

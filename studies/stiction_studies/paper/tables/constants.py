@@ -1,7 +1,5 @@
 """Table A.3: variables and parameters of the stirred tank."""
 
-from __future__ import annotations
-
 from stiction_ros.config_files import find_config
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.session import Scenario

@@ -1,7 +1,5 @@
 """What Figure 6 leaves open: tuning, warm start and cost, and the friction that was identified."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from stiction_ros.identification import Identification

@@ -1,7 +1,5 @@
 """The paper's methods with the other smoothed laws."""
 
-from __future__ import annotations
-
 import time
 
 from stiction_ros.paper.methods import identify

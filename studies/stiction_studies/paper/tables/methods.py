@@ -1,7 +1,5 @@
 """Computing times of Section 4, and how often each method is right."""
 
-from __future__ import annotations
-
 import platform
 
 from stiction_ros.config_files import find_config

@@ -1,7 +1,5 @@
 """Tables 1 and 2: the transfer functions of the tank, actual and identified."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Numbers that the paper prints, as printed, and as they must be meant."""
 
-from __future__ import annotations
-
 import numpy as np
 
 THETA_1_A = (-1.281, -0.1107, 0.413)

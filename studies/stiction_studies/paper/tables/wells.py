@@ -1,7 +1,5 @@
 """Why the programme is hard: how wide the well round the truth is, and where smoothing leads."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray

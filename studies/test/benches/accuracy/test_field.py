@@ -1,7 +1,5 @@
 """`stiction bench field`: its counting and options."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from pathlib import Path

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 
 from stiction_ros.gain.gain import What

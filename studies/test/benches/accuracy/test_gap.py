@@ -1,7 +1,5 @@
 """`stiction bench gap`: its log, its options, and a small fixed subset of blind loops."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

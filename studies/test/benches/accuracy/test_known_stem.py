@@ -1,7 +1,5 @@
 """What a record holds of a friction: the gain of the stem that truly moved."""
 
-from __future__ import annotations
-
 import pytest
 
 from stiction_ros.identification.evidence.rates import PRICE

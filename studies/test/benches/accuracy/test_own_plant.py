@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from stiction_studies.benches.accuracy.own_plant import MODES, WORSE, OwnPlant, judge
 
 

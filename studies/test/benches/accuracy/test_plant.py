@@ -1,7 +1,5 @@
 """`stiction bench plant`: the list of a survey against the truth of a made plant."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`stiction bench valve-test`: its valves, its counting and one test."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

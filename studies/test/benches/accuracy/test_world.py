@@ -1,7 +1,5 @@
 """`stiction bench world`: its options, its log, one loop judged."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

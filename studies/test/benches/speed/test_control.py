@@ -1,7 +1,5 @@
 """`stiction bench control`: its rows, on few problems."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

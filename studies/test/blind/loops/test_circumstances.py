@@ -1,7 +1,5 @@
 """Noise and set-points are what the regime says."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

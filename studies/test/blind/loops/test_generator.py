@@ -1,7 +1,5 @@
 """Blind loops: repeatable, finite, and silent about what is hidden."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Changes outside the catalogue: nothing before they begin, and what they say after."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

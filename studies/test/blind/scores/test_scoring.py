@@ -1,7 +1,5 @@
 """What counts as right, wrong and in doubt."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Answers about loops of the field: what is right, wrong and in doubt."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """A broken loop, and a broken harness, must not pass."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """Loops with something hidden in them: what a seed gives."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

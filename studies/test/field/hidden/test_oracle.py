@@ -1,7 +1,5 @@
 """The oracle: noise made white, what is there found, what is not there not."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

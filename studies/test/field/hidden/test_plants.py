@@ -1,7 +1,5 @@
 """Plants in continuous time, and the equations that are given of them."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
