@@ -58,10 +58,7 @@ SMALL: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
             r"error\| [01]\.\d+ over samples 504 to 3004",
         ),
     ),
-    "09_bags": (
-        {"samples": 600},
-        (r"/pv 600", r"metadata\.yaml", r"600 samples", r"V1 sticky"),
-    ),
+    "09_bags": ({"samples": 600}, (r"/pv 600", r"metadata\.yaml", r"600 samples", r"V1 sticky")),
     "10_add_a_friction_law": (
         {"samples": 700},
         (
@@ -107,10 +104,7 @@ def test_it_uses_the_public_face(path: Path) -> None:
     ids=lambda path: path.stem,
 )
 def test_it_runs_and_says_what_it_promises(
-    path: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if path.stem == "09_bags":
         pytest.importorskip("sensor_msgs", reason="the definitions are not installed")

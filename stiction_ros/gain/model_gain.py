@@ -12,14 +12,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.gain.embedding import EmbeddingDesign
 from stiction_ros.gain.gain import Gain, Option, What, option_of
 from stiction_ros.gain.measures import Measures, Yardstick, cycle_period
-from stiction_ros.gain.retuning import (
-    UNCHANGED,
-    Tuning,
-    calm,
-    frequencies,
-    most_helpful,
-    peak,
-)
+from stiction_ros.gain.retuning import UNCHANGED, Tuning, calm, frequencies, most_helpful, peak
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.closed_loop import Controller, own_controller, simulate_closed_loop
 from stiction_ros.loop.model import PiTuning

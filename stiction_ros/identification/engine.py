@@ -40,9 +40,7 @@ Progress = Callable[[float], None]
 
 
 def identify_exact(
-    record: Record,
-    options: IdentificationOptions | None = None,
-    progress: Progress | None = None,
+    record: Record, options: IdentificationOptions | None = None, progress: Progress | None = None
 ) -> Identification:
     """Identify friction and linear dynamics of every valve and output of a record.
 
@@ -167,9 +165,7 @@ def order_row(orders: Orders, model: Model) -> OrderRow:
 
 
 def ambiguities(
-    record: Record,
-    delays: list[list[tuple[int, ...]]],
-    valves: tuple[tuple[int, int], ...],
+    record: Record, delays: list[list[tuple[int, ...]]], valves: tuple[tuple[int, int], ...]
 ) -> tuple[str, ...]:
     """Return sentences on what explains the record equally well."""
     told = [

@@ -57,10 +57,7 @@ def write_csv(
             where=record.name,
             fix="write each of its segments by itself",
         )
-    plain = (record.valves, record.outputs) == (
-        (DEFAULT_VALVE,),
-        (DEFAULT_OUTPUT,),
-    )
+    plain = (record.valves, record.outputs) == ((DEFAULT_VALVE,), (DEFAULT_OUTPUT,))
     times = _iso(record) if iso else [repr(t) for t in (record.start + record.time).tolist()]
     header, columns = ["t"], [times]
     for key, name in SIGNALS.items():

@@ -47,11 +47,7 @@ def test_the_compiler_is_not_broken_off_and_what_follows_is() -> None:
     told = subprocess.run(
         [sys.executable, "-c", COMPILING], capture_output=True, text=True, check=True, timeout=60
     )
-    assert told.stdout.splitlines() == [
-        "went on",
-        "interrupted behind",
-        "True True True False",
-    ]
+    assert told.stdout.splitlines() == ["went on", "interrupted behind", "True True True False"]
 
 
 def interrupted() -> None:

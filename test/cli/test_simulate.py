@@ -9,13 +9,7 @@ from as_given import open_record
 from stiction_ros.cli.main import main
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
-from stiction_ros.loop import (
-    LoopModel,
-    PiController,
-    SetPoints,
-    simulate,
-    simulate_closed_loop,
-)
+from stiction_ros.loop import LoopModel, PiController, SetPoints, simulate, simulate_closed_loop
 from stiction_ros.loop.closed_loop import own_controller
 
 FLOW = find_config("flow.loop.yaml")

@@ -19,12 +19,7 @@ from loops import (
 from scipy.optimize import minimize
 
 from stiction_ros.control import embedding
-from stiction_ros.control.embedding import (
-    SECOND_JUMPS,
-    EmbeddingMpc,
-    EmbeddingTuning,
-    patterns,
-)
+from stiction_ros.control.embedding import SECOND_JUMPS, EmbeddingMpc, EmbeddingTuning, patterns
 from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonWeights
 from stiction_ros.control.jump_form import FrictionSpread, jump_form
 from stiction_ros.control.result import Plan

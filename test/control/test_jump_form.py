@@ -93,13 +93,7 @@ def test_the_inverse_moves_the_stem_at_least_as_near_as_staying(
     assert abs(moved - stem - move) <= abs(move) + 1e-6
 
 
-@pytest.mark.parametrize(
-    "law",
-    [
-        SmoothedHeStiction(8.0, 1.0),
-        SmoothedKanoStiction(9.0, 7.0),
-    ],
-)
+@pytest.mark.parametrize("law", [SmoothedHeStiction(8.0, 1.0), SmoothedKanoStiction(9.0, 7.0)])
 def test_a_law_without_a_jump_form_is_refused_with_those_that_have_one(law: Behaviour) -> None:
     with pytest.raises(InputError) as caught:
         jump_form(law)

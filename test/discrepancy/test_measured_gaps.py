@@ -104,12 +104,7 @@ def test_figures_and_words_of_control_loops_hold_together(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        "2111LIC31102B_0825_0007",
-        "2411FIC20102_0609_0957",
-        "2411FIC20102_0823_1527",
-    ],
+    "name", ["2111LIC31102B_0825_0007", "2411FIC20102_0609_0957", "2411FIC20102_0823_1527"]
 )
 def test_figures_and_words_of_plant_records_hold_together(name: str) -> None:
     effects_are_told(plant(name))

@@ -5,13 +5,7 @@ import pytest
 
 from stiction_ros.effects import Stiction, from_mapping
 from stiction_ros.errors import InputError
-from stiction_ros.gain.draws import (
-    DRAWS,
-    Draws,
-    drawn_frictions,
-    possible_frictions,
-    resampled,
-)
+from stiction_ros.gain.draws import DRAWS, Draws, drawn_frictions, possible_frictions, resampled
 from stiction_ros.gain.embedding import RUNS, EmbeddingDesign, embedded, pair_of
 from stiction_ros.gain.gain import Gain, Option, What, embedding_part, gain_of
 from stiction_ros.gain.measures import Measures

@@ -133,8 +133,7 @@ def test_unknown_law_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [{"delay": (3, 1)}, {"output_order": 0}, {"friction_limit": 0.0}, {"confidence": 1.5}],
+    "wrong", [{"delay": (3, 1)}, {"output_order": 0}, {"friction_limit": 0.0}, {"confidence": 1.5}]
 )
 def test_options_are_checked(wrong: dict[str, object]) -> None:
     with pytest.raises(InputError):
@@ -146,7 +145,7 @@ def test_orders_that_were_compared_are_listed() -> None:
     found = identify(loops.example1(0, samples=900))
     assert [row.output_order for row in found.orders] == [1, 2, 3]
     assert found.to_dict()["model"]["orders"][0].keys() == {
-        *("output_order", "input_order", "aic", "bic"),
+        *("output_order", "input_order", "aic", "bic")
     }
     best = min(found.orders, key=lambda row: row.bic)
     assert len(found.outputs[0].a) == best.output_order

@@ -20,10 +20,7 @@ FULL: dict[str, Any] = {
     "sample_time": 2.0,
     "valves": [
         {"name": "V1", "limits": [0.0, 100.0], "effects": []},
-        {
-            "name": "V2",
-            "effects": [{"effect": "stiction", "law": "he", "f_s": 5.0, "f_d": 2.0}],
-        },
+        {"name": "V2", "effects": [{"effect": "stiction", "law": "he", "f_s": 5.0, "f_d": 2.0}]},
     ],
     "process": {
         "kind": "arx",
@@ -287,10 +284,7 @@ WRONG = {
     "no process": (without(FULL, "process"), "lacks 'process'"),
     "process is a list": (changed(FULL, "process", []), "expected keys"),
     "no outputs": (changed(FULL, "process.outputs", []), "no output"),
-    "output twice": (
-        changed(FULL, "process.outputs", FULL["process"]["outputs"] * 2),
-        "one name",
-    ),
+    "output twice": (changed(FULL, "process.outputs", FULL["process"]["outputs"] * 2), "one name"),
     "b names a stranger": (changed(FULL, "process.outputs.0.b", {"V9": [1.0]}), "V9"),
     "b is empty": (changed(FULL, "process.outputs.0.b.V1", []), "empty"),
     "b is a number": (changed(FULL, "process.outputs.0.b.V1", 0.1), "no list"),
@@ -328,10 +322,7 @@ WRONG = {
     "sensor twice": (changed(FULL, "sensors", FULL["sensors"] * 2), "there twice"),
     "empty matrix": (changed(STATE_SPACE, "process.a", []), "rows"),
     "one valve for a tank": (changed(TANK, "valves", [{"name": "V1"}]), "two valves"),
-    "tank about a point": (
-        TANK | {"operating_point": {"op": {"V1": 40.0}}},
-        "absolute units",
-    ),
+    "tank about a point": (TANK | {"operating_point": {"op": {"V1": 40.0}}}, "absolute units"),
     "tank with a stranger": (
         changed(TANK, "process.measured_disturbances", ["F_A"]),
         "unknown disturbance",

@@ -53,8 +53,7 @@ def test_rounding_of_the_clock_shifts_no_move(sample_time: float, count: int) ->
 
 
 @pytest.mark.parametrize(
-    ("name", "outputs"),
-    [("siso.set_points.yaml", ("PV1",)), ("tank.set_points.yaml", ("C", "T"))],
+    ("name", "outputs"), [("siso.set_points.yaml", ("PV1",)), ("tank.set_points.yaml", ("C", "T"))]
 )
 def test_the_schedules_that_come_along_are_read(name: str, outputs: tuple[str, ...]) -> None:
     points = SetPoints.load(find_config(name), outputs)

@@ -236,8 +236,7 @@ class Hand:
     def __init__(self, graph: Graph, **parameters: Any) -> None:
         self.graph = graph
         self.node = graph.add(
-            "controller",
-            {"model": "example1_process.loop.yaml", "fit_first": 10**6} | parameters,
+            "controller", {"model": "example1_process.loop.yaml", "fit_first": 10**6} | parameters
         )
         self.node.start()
         probe = graph.plain()
@@ -286,8 +285,7 @@ def test_a_plant_that_was_paused_goes_on_with_the_same_numbers(graph: Graph) -> 
     ops: list[JointState] = []
     graph.plain().create_subscription(JointState, "op", ops.append, SIGNAL_QOS)
     plant = graph.add(
-        "plant",
-        values("plant", Path()) | {"samples": 60, "seed": 4, "wait_for": ["controller"]},
+        "plant", values("plant", Path()) | {"samples": 60, "seed": 4, "wait_for": ["controller"]}
     )
     controller = graph.add("controller", values("controller", Path()) | {"wait_for": ["plant"]})
     plant.start()

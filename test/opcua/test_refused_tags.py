@@ -83,10 +83,7 @@ def test_the_other_tags_are_heard_and_the_refused_ones_once_they_are_there(
     listener.wait_for(lambda event: isinstance(event, Linked) and event.connected)
     listener.wait_for(is_heard(pv))
     (told,) = listener.refused()
-    assert told.read == {
-        wrong: UNKNOWN,
-        foreign: "is of no namespace of the server, urn:other",
-    }
+    assert told.read == {wrong: UNKNOWN, foreign: "is of no namespace of the server, urn:other"}
     server.add("PVX", 7.0, "Double")
     first = listener.wait_for(is_heard(wrong))
     assert isinstance(first, Heard)

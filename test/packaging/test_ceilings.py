@@ -9,8 +9,8 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LINES = 71_219
-LINES_OF_STUDIES = 23_411
+LINES = 70_033
+LINES_OF_STUDIES = 23_034
 NUMERIC_CONSTANTS = 921
 
 MODULE = """
@@ -65,7 +65,7 @@ def test_numeric_constants_stay_below_their_ceiling(house: ModuleType) -> None:
 
 def test_each_name_that_is_given_a_number_counts(house: ModuleType) -> None:
     assert house.constants(ast.parse(MODULE)) == [
-        *("PLAIN", "_SIGNED", "FEW", "FIRST", "SECOND", "SAME", "AGAIN", "L2", "MIXED"),
+        *("PLAIN", "_SIGNED", "FEW", "FIRST", "SECOND", "SAME", "AGAIN", "L2", "MIXED")
     ]
 
 

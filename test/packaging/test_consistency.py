@@ -15,19 +15,9 @@ from stiction_ros.nodes.__main__ import NODES
 
 ROOT = Path(__file__).resolve().parents[2]
 # Python module → distribution in setup.cfg, where the names differ.
-DISTRIBUTION = {
-    "mcap_ros2": "mcap-ros2-support",
-    "yaml": "pyyaml",
-}
+DISTRIBUTION = {"mcap_ros2": "mcap-ros2-support", "yaml": "pyyaml"}
 # Imported where it is there; the package runs without.
-OPTIONAL = {
-    "asyncua",
-    "cryptography",
-    "dask",
-    "distributed",
-    "openpyxl",
-    "pyarrow",
-}
+OPTIONAL = {"asyncua", "cryptography", "dask", "distributed", "openpyxl", "pyarrow"}
 # Distribution in setup.cfg → rosdep key in package.xml; the others are installed with pip.
 ROSDEP = {
     "numpy": "python3-numpy",

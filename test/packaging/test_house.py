@@ -83,12 +83,7 @@ def test_lines_and_functions_are_counted(house: ModuleType, tree: Path) -> None:
     assert source.lines == len(MODEL.splitlines())
     assert source.docstring == 4 + 5 + 1 + 5 + 1 + 1 + 1
     assert source.comment == 2
-    assert source.functions == {
-        "told": True,
-        "hidden": True,
-        "silent": False,
-        "Loop.method": False,
-    }
+    assert source.functions == {"told": True, "hidden": True, "silent": False, "Loop.method": False}
 
 
 def test_public_names_are_followed_home(house: ModuleType, tree: Path) -> None:

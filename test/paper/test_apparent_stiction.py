@@ -8,10 +8,7 @@ import simulated_loops as loops
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.paper.programme.apparent_stiction import (
-    apparent_stictions,
-    fit_ellipse,
-)
+from stiction_ros.paper.programme.apparent_stiction import apparent_stictions, fit_ellipse
 
 
 @given(

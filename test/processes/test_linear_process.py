@@ -197,8 +197,7 @@ def test_noise_std_is_split_by_where_it_enters() -> None:
 
 
 @pytest.mark.parametrize(
-    ("b", "delay"),
-    [({"V1": (1.0,)}, {}), ({"V1": (1.0,)}, {"V1": -1}), ({"V1": ()}, {"V1": 0})],
+    ("b", "delay"), [({"V1": (1.0,)}, {}), ({"V1": (1.0,)}, {"V1": -1}), ({"V1": ()}, {"V1": 0})]
 )
 def test_equations_that_do_not_fit_together_are_refused(
     b: dict[str, tuple[float, ...]], delay: dict[str, int]

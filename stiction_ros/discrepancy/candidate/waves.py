@@ -164,10 +164,7 @@ class ShapedWave(LineWave):
 
     @classmethod
     def of(
-        cls,
-        run: FreeRun,
-        lines: FloatArray,
-        kind: type[SquareDisturbance | TriangleDisturbance],
+        cls, run: FreeRun, lines: FloatArray, kind: type[SquareDisturbance | TriangleDisturbance]
     ) -> Self:
         """Return the wave as it is searched in a record."""
         length = length_of(run)

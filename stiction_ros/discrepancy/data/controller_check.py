@@ -7,12 +7,7 @@ import math
 import numpy as np
 
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
-from stiction_ros.discrepancy.data.scans import (
-    Scans,
-    errors_of,
-    law_terms,
-    scanned_twice,
-)
+from stiction_ros.discrepancy.data.scans import Scans, errors_of, law_terms, scanned_twice
 from stiction_ros.discrepancy.data.set_point import NORMAL_OF_MEDIAN, told_set_points
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.free_run import Runs

@@ -69,11 +69,7 @@ def open_gate(model: LoopModel, records: Sequence[Record]) -> tuple[Runs, Gate]:
     runs = join_records(model, records)
     gate = look_at_data(model, runs)
     seen = dataclasses.replace(
-        runs,
-        usable=gate.usable,
-        quanta=gate.rounding,
-        filled=gate.filled,
-        lattices=gate.quantum,
+        runs, usable=gate.usable, quanta=gate.rounding, filled=gate.filled, lattices=gate.quantum
     )
     return seen, gate
 

@@ -64,9 +64,7 @@ class Decision:
 
 
 def decide(
-    fits: Sequence[CandidateFit],
-    margin: float,
-    departures: Callable[[CandidateFit], int],
+    fits: Sequence[CandidateFit], margin: float, departures: Callable[[CandidateFit], int]
 ) -> Decision:
     """Return what may be said.
 
@@ -175,12 +173,7 @@ def on_the_way(place: str, effect: str) -> bool:
 
 def _unknown(stranger: CandidateFit, reason: str, lent: CandidateFit | None) -> Decision:
     return Decision(
-        GapVerdict.UNKNOWN,
-        None,
-        (),
-        False,
-        f"{_would_explain(stranger)}; {reason}",
-        lent,
+        GapVerdict.UNKNOWN, None, (), False, f"{_would_explain(stranger)}; {reason}", lent
     )
 
 
@@ -235,9 +228,7 @@ def _same_family(one: CandidateFit, other: CandidateFit) -> bool:
 
 
 def friction_kind(
-    best: CandidateFit,
-    ranked: Sequence[CandidateFit],
-    departures: Callable[[CandidateFit], int],
+    best: CandidateFit, ranked: Sequence[CandidateFit], departures: Callable[[CandidateFit], int]
 ) -> tuple[CandidateFit, tuple[tuple[str, str], ...]]:
     """Return stiction or backlash by the test of the jump, and the other one in doubt.
 

@@ -21,11 +21,7 @@ _ROUNDING = 1e-14
 
 @compiled
 def left_of_shifts(
-    target: FloatArray,
-    shift: FloatArray,
-    rows: IntArray,
-    basis: FloatArray,
-    ar: FloatArray,
+    target: FloatArray, shift: FloatArray, rows: IntArray, basis: FloatArray, ar: FloatArray
 ) -> FloatArray:
     """Return the squared innovations that each response leaves, shape (G,).
 
@@ -78,11 +74,7 @@ def _solved(gram: FloatArray, cross: FloatArray) -> FloatArray:
 
 @compiled
 def taken_by_sizes(
-    target: FloatArray,
-    sizes: FloatArray,
-    rows: BoolArray,
-    basis: FloatArray,
-    ar: FloatArray,
+    target: FloatArray, sizes: FloatArray, rows: BoolArray, basis: FloatArray, ar: FloatArray
 ) -> FloatArray:
     """Return the squares that least squares of the factors takes away, shape (G,).
 

@@ -11,11 +11,7 @@ from stiction_ros.discrepancy.candidate.base import Candidate, figures_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import PROBE, misfit, settled
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
-from stiction_ros.discrepancy.likelihood.noise import (
-    given_noise,
-    information,
-    shared_factors,
-)
+from stiction_ros.discrepancy.likelihood.noise import given_noise, information, shared_factors
 from stiction_ros.effects import FloatArray
 from stiction_ros.signals.autoregression import TINY, coloured
 

@@ -18,12 +18,7 @@ from stiction_ros.discrepancy.gap.noise_laws import (
 )
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
 from stiction_ros.discrepancy.likelihood.noise import ENLARGED
-from stiction_ros.effects import (
-    Behaviour,
-    ColouredDisturbance,
-    FloatArray,
-    RandomWalkDisturbance,
-)
+from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
 
 SIDES = (-1.0, 1.0)
 REJECTED = 8.0  # −2 log likelihood, above that of the best figures

@@ -12,12 +12,7 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
 from stiction_ros.discrepancy.likelihood.noise import SURPRISE, VANISHED, Blocks
 from stiction_ros.discrepancy.likelihood.state_noise import innovations, left_by_columns
-from stiction_ros.effects import (
-    Behaviour,
-    ColouredDisturbance,
-    FloatArray,
-    RandomWalkDisturbance,
-)
+from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.processes import AlteredProcess, ArxProcess
 from stiction_ros.signals.autoregression import TINY, companion

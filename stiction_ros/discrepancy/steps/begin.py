@@ -21,10 +21,7 @@ from stiction_ros.records import Record
 
 
 def begin(
-    model: LoopModel,
-    records: Sequence[Record],
-    options: GapOptions,
-    progress: Progress | None,
+    model: LoopModel, records: Sequence[Record], options: GapOptions, progress: Progress | None
 ) -> tuple[Task, State]:
     """Return what the other steps are given, and what is believed before the first look.
 

@@ -209,12 +209,7 @@ def _effect(
 
 
 def _intervals(
-    task: Task,
-    state: State,
-    k: int,
-    effect: AddedEffect,
-    base: Baseline,
-    beside: list[FloatArray],
+    task: Task, state: State, k: int, effect: AddedEffect, base: Baseline, beside: list[FloatArray]
 ) -> Intervals:
     if task.options.quick:
         found = likelihood_intervals(base, effect.fit, beside)

@@ -7,12 +7,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.valve import departures
-from stiction_ros.discrepancy.decision.decide import (
-    Decision,
-    GapVerdict,
-    decide,
-    thinned_away,
-)
+from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict, decide, thinned_away
 from stiction_ros.discrepancy.decision.extend import (
     AddedEffect,
     Extension,
@@ -41,11 +36,7 @@ from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.process.refit import open_figures, refitted_behind
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
-from stiction_ros.discrepancy.steps.mending import (
-    changed_again,
-    made_room,
-    process_first,
-)
+from stiction_ros.discrepancy.steps.mending import changed_again, made_room, process_first
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.loop import LoopModel
 

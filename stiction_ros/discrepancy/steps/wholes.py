@@ -11,11 +11,7 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_check import spans_steps
 from stiction_ros.discrepancy.gap.noise_effects import noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.process.change import (
-    ChangedProcess,
-    ProcessChange,
-    changed_process,
-)
+from stiction_ros.discrepancy.process.change import ChangedProcess, ProcessChange, changed_process
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.loop import LoopModel
 

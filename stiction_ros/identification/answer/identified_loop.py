@@ -73,10 +73,7 @@ def identified_loop(record: Record, found: Identification, name: str) -> LoopMod
             for model, (_, std, lag) in zip(found.outputs, noises, strict=True)
             if std > 0.0
         ],
-        "operating_point": {
-            "op": _named(record.valves, op0),
-            "pv": _named(record.outputs, pv0),
-        },
+        "operating_point": {"op": _named(record.valves, op0), "pv": _named(record.outputs, pv0)},
         "initial": {
             "stem": _named(record.valves, found.stem[0]),
             "pv": _named(record.outputs, record.pv[0]),

@@ -23,18 +23,8 @@ from stiction_ros.loop.linear_loops import Process
 from stiction_ros.records.record import Record
 from stiction_ros.signals.controller_recovery import recover
 from stiction_ros.signals.holds import holds
-from stiction_ros.signals.oscillation import (
-    Oscillation,
-    amplitude,
-    oscillation,
-)
-from stiction_ros.signals.outside_line import (
-    NO_LINE,
-    OutsideLine,
-    Predicted,
-    beside,
-    outside_line,
-)
+from stiction_ros.signals.oscillation import Oscillation, amplitude, oscillation
+from stiction_ros.signals.outside_line import NO_LINE, OutsideLine, Predicted, beside, outside_line
 from stiction_ros.signals.recovered_controller import (
     ControllerStatus,
     LoopSignals,

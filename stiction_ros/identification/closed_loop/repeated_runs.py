@@ -13,10 +13,7 @@ from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
 from stiction_ros.loop.linear_loops import Controllers, Pairs, Process, Runs, run_loops
 from stiction_ros.signals.movement import moving, size
-from stiction_ros.signals.oscillation import (
-    REGULAR,
-    oscillation,
-)
+from stiction_ros.signals.oscillation import REGULAR, oscillation
 from stiction_ros.signals.spectral_lines import fitted_lines
 
 MOST = 6000

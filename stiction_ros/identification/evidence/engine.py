@@ -58,9 +58,7 @@ Progress = Callable[[float], None]
 
 
 def identify_by_evidence(
-    record: Record,
-    options: IdentificationOptions | None = None,
-    progress: Progress | None = None,
+    record: Record, options: IdentificationOptions | None = None, progress: Progress | None = None
 ) -> Identification:
     """Identify friction by its evidence, and linear dynamics for the stems that it gives.
 
@@ -258,10 +256,7 @@ def _stems(data: Data, valves: tuple[ValveEstimate, ...], starts: FloatArray) ->
 
 
 def _process(
-    data: Data,
-    options: IdentificationOptions,
-    valves: tuple[ValveEstimate, ...],
-    record: Record,
+    data: Data, options: IdentificationOptions, valves: tuple[ValveEstimate, ...], record: Record
 ) -> tuple[Model, tuple[OrderRow, ...]]:
     """Return orders, delays and linear parts for the stems, and all orders that were tried."""
     friction = np.array([[v.static_friction, v.dynamic_friction] for v in valves])

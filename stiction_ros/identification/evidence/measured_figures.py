@@ -15,11 +15,7 @@ FEW = 2.0
 
 
 def figures_of(
-    seen: Sequence[Look],
-    silent: Sequence[float],
-    agreed: Agreement,
-    valve: int,
-    closed: ClosedLoop,
+    seen: Sequence[Look], silent: Sequence[float], agreed: Agreement, valve: int, closed: ClosedLoop
 ) -> Figures:
     """Return the figures of one valve.
 

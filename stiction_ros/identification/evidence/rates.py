@@ -28,12 +28,7 @@ from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import settled
 from stiction_ros.identification.evidence.outside_waves import outside_wave
-from stiction_ros.identification.evidence.search import (
-    Found,
-    better,
-    search,
-    search_again,
-)
+from stiction_ros.identification.evidence.search import Found, better, search, search_again
 from stiction_ros.identification.evidence.sensor_hold import refresh, restored
 from stiction_ros.identification.exact.long_records import PART, liveliest_begin
 from stiction_ros.identification.identification_options import IdentificationOptions

@@ -13,12 +13,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.exact.pattern_search import PatternSearch, nearby_delays, points_of
 from stiction_ros.identification.problem.models import Data, Model, with_valve
 from stiction_ros.identification.problem.output_error import Orders
-from stiction_ros.identification.switching.patterns import (
-    Beginning,
-    Cells,
-    beginning_of,
-    cells_at,
-)
+from stiction_ros.identification.switching.patterns import Beginning, Cells, beginning_of, cells_at
 from stiction_ros.identification.switching.rectangles import overlapping, remainders
 from stiction_ros.identification.switching.scan import PatternScan
 

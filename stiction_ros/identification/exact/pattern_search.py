@@ -34,11 +34,7 @@ from stiction_ros.identification.switching.patterns import (
     levels_with,
     resting_cells,
 )
-from stiction_ros.identification.switching.rectangles import (
-    area,
-    points_inside,
-    remainders,
-)
+from stiction_ros.identification.switching.rectangles import area, points_inside, remainders
 from stiction_ros.identification.switching.scan import PatternScan
 from stiction_ros.identification.switching.step_signals import StepSignals
 

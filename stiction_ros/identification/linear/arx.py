@@ -7,12 +7,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.identification.linear.data import (
-    LinearData,
-    LinearStatus,
-    information,
-    nrmse_fit,
-)
+from stiction_ros.identification.linear.data import LinearData, LinearStatus, information, nrmse_fit
 from stiction_ros.processes import ArxOutput, Noise, NoiseEntry
 from stiction_ros.signals.arx_fit import ArxOrders, fit_arx, stable_arx
 from stiction_ros.signals.free_run import driven, fitted_free_run

@@ -17,11 +17,7 @@ from stiction_ros.identification.linear.data import (
     OrderCriterion,
     prepare_linear,
 )
-from stiction_ros.identification.linear.orders import (
-    OrderChoice,
-    OrderOptions,
-    choose_orders,
-)
+from stiction_ros.identification.linear.orders import OrderChoice, OrderOptions, choose_orders
 from stiction_ros.identification.linear.result import (
     LinearIdentification,
     arx_result,

@@ -3,12 +3,7 @@
 import dataclasses
 
 from stiction_ros.errors import InputError
-from stiction_ros.identification.linear.arx import (
-    EquationFit,
-    EquationOrders,
-    check,
-    fit_equation,
-)
+from stiction_ros.identification.linear.arx import EquationFit, EquationOrders, check, fit_equation
 from stiction_ros.identification.linear.data import LinearData, OrderCriterion
 
 DELAY_MARGIN = 2.0

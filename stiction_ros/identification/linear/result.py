@@ -12,12 +12,7 @@ from stiction_ros.identification.linear.data import LinearData, LinearKind, Line
 from stiction_ros.identification.linear.orders import OrderChoice
 from stiction_ros.identification.linear.subspace import StateSpaceFit
 from stiction_ros.loop import LoopModel
-from stiction_ros.processes import (
-    ArxProcess,
-    LinearModel,
-    Noise,
-    StateSpaceProcess,
-)
+from stiction_ros.processes import ArxProcess, LinearModel, Noise, StateSpaceProcess
 from stiction_ros.processes.linear_process import LinearProcess
 
 

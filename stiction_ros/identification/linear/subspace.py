@@ -33,11 +33,7 @@ from stiction_ros.signals.state_space_fit import (
     with_best_gain,
     with_initial_state,
 )
-from stiction_ros.signals.subspace_projection import (
-    StateSequence,
-    SubspaceMethod,
-    state_sequence,
-)
+from stiction_ros.signals.subspace_projection import StateSequence, SubspaceMethod, state_sequence
 
 DEFAULT_HORIZON = 15  # block rows of past and future, samples, where the record allows it
 MAX_ORDER = 8  # that is tried

@@ -13,11 +13,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.kernels.delay import delay_energy
 from stiction_ros.identification.kernels.filter import Window
-from stiction_ros.identification.kernels.scan import (
-    least_energy,
-    remaining_tails,
-    step_products,
-)
+from stiction_ros.identification.kernels.scan import least_energy, remaining_tails, step_products
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.switching.step_signals import StepSignals
 

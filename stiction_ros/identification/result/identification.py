@@ -275,10 +275,7 @@ class Identification:
             "sample_time": self.sample_time,
             "seconds": self.seconds,
             "model": model,
-            "rate": {
-                "sample_time": self.sample_time,
-                "used": self.row_samples * self.sample_time,
-            },
+            "rate": {"sample_time": self.sample_time, "used": self.row_samples * self.sample_time},
             "valves": [valve.to_dict() for valve in self.valves],
             "outputs": [output.to_dict() for output in self.outputs],
         }

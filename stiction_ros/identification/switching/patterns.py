@@ -187,10 +187,7 @@ def resting_cells(
 
 
 def _moving_cells(
-    rules: MovingRules,
-    points: FloatArray,
-    levels: FloatArray,
-    first: tuple[int, float] | None,
+    rules: MovingRules, points: FloatArray, levels: FloatArray, first: tuple[int, float] | None
 ) -> Cells:
     u = rules.u
     traces = [

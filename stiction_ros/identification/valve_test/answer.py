@@ -3,11 +3,7 @@
 import dataclasses
 from typing import Any
 
-from stiction_ros.identification.valve_test.facts import (
-    Limits,
-    facts_of_test,
-    judged_record,
-)
+from stiction_ros.identification.valve_test.facts import Limits, facts_of_test, judged_record
 from stiction_ros.identification.valve_test.judgement import Judgement
 from stiction_ros.identification.valve_test.plan import Facts, Plan, further_round
 from stiction_ros.records.record import Record
@@ -23,11 +19,7 @@ class Answer:
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``valve-test judge --json``."""
         plan = None if self.plan is None else self.plan.to_dict()
-        return {
-            **self.judgement.to_dict(),
-            "next": plan,
-            "sentence": self.judgement.sentence,
-        }
+        return {**self.judgement.to_dict(), "next": plan, "sentence": self.judgement.sentence}
 
 
 def answer(record: Record, facts: Facts | None, limits: Limits) -> Answer:

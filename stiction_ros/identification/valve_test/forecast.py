@@ -8,12 +8,7 @@ from scipy.special import ndtr
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.valve_test.judgement import Judgement
-from stiction_ros.identification.valve_test.likelihood import (
-    CURVATURE,
-    KNOWN,
-    OWN_ERROR,
-    Shape,
-)
+from stiction_ros.identification.valve_test.likelihood import CURVATURE, KNOWN, OWN_ERROR, Shape
 from stiction_ros.identification.valve_test.search import UNSHOWN, Explanation, Trial
 from stiction_ros.identification.valve_test.steps import Steps
 

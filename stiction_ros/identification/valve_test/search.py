@@ -11,12 +11,7 @@ from scipy.special import ndtri
 from stiction_ros.deferred import halton_sequence
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.identification.valve_test.frictions import LEVELS, Frictions
-from stiction_ros.identification.valve_test.likelihood import (
-    Answered,
-    Dynamics,
-    Shape,
-    log_sum,
-)
+from stiction_ros.identification.valve_test.likelihood import Answered, Dynamics, Shape, log_sum
 from stiction_ros.identification.valve_test.steps import Steps
 
 EVALUATIONS = 150

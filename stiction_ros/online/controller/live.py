@@ -7,12 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from stiction_ros.control import (
-    ControlDesign,
-    ControlMode,
-    MpcController,
-    StepResult,
-)
+from stiction_ros.control import ControlDesign, ControlMode, MpcController, StepResult
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel

@@ -191,10 +191,7 @@ def _amplitudes(live: "LiveRun", scenario: "Scenario", seed: int) -> dict[str, f
     sigma = [0.0] * len(record.outputs)
     before, after = (
         score(one, first, len(one), cycle.period, sigma).scores
-        for one, first in (
-            (twin.run.record, round_samples),
-            (record, len(record) - round_samples),
-        )
+        for one, first in ((twin.run.record, round_samples), (record, len(record) - round_samples))
     )
     return {
         name: (one.amplitude or math.nan) / (before[name].amplitude or math.nan)

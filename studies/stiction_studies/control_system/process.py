@@ -37,12 +37,7 @@ from stiction_studies.control_system.tags import (
 
 MODEL = "tank.loop.yaml"
 PI = ({"gain": 40.0, "integral_time": 900.0}, {"gain": 3.0, "integral_time": 600.0})
-ACCOUNTS = {
-    "bridge": (REMOTE_USE,),
-    "reader": (),
-    "operator": (OPERATION,),
-    "tester": (TESTING,),
-}
+ACCOUNTS = {"bridge": (REMOTE_USE,), "reader": (), "operator": (OPERATION,), "tester": (TESTING,)}
 LISTENING = b"listening"
 READY = 60.0  # s for the server to start, and to end
 MARGIN = datetime.timedelta(hours=1)  # by which clocks may differ

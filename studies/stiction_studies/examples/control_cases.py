@@ -10,13 +10,7 @@ from stiction_ros.control.embedding import EmbeddingMpc
 from stiction_ros.effects import Behaviour, HeStiction, StepDisturbance
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.loop import (
-    ClosedLoopRun,
-    LoopModel,
-    Measurement,
-    SetPoints,
-    simulate_closed_loop,
-)
+from stiction_ros.loop import ClosedLoopRun, LoopModel, Measurement, SetPoints, simulate_closed_loop
 from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.session import Scenario
 from stiction_ros.records.valve_work import ValveWork, largest_op_step
@@ -73,13 +67,7 @@ CASES: Mapping[str, ControlCase] = {
         ControlCase("T_A", None, TRUE, TRUE, ("T_A", 12000.0, 2.0)),
         ControlCase("F_B", None, TRUE, TRUE, ("F_B", 12000.0, 0.03)),
         # An offset of T is mended by valve 2 alone: dearer jumps leave more than 0.02 °C.
-        ControlCase(
-            "two_valves",
-            None,
-            SECOND,
-            SECOND,
-            settings={"move_worth": (0.022, 0.007)},
-        ),
+        ControlCase("two_valves", None, SECOND, SECOND, settings={"move_worth": (0.022, 0.007)}),
     )
 }
 

@@ -187,11 +187,7 @@ def _reported(
 
 
 def _with_missing_rows(
-    random: np.random.Generator,
-    op: FloatArray,
-    pv: FloatArray,
-    sp: FloatArray,
-    mask: QualityArray,
+    random: np.random.Generator, op: FloatArray, pv: FloatArray, sp: FloatArray, mask: QualityArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, QualityArray]:
     """Return the signals with 1 to 5 % of the rows filled as a reader fills them.
 

@@ -208,13 +208,7 @@ def plant_output(kind: int, s: FloatArray) -> float:
 
 @compiled
 def plant_step(
-    kind: int,
-    p: FloatArray,
-    s: FloatArray,
-    stem: float,
-    load: float,
-    h: float,
-    work: FloatArray,
+    kind: int, p: FloatArray, s: FloatArray, stem: float, load: float, h: float, work: FloatArray
 ) -> None:
     """Advance a plant by ``h`` s with the classical Runge-Kutta rule, in place."""
     rates, total, at = work[0], work[1], work[2]

@@ -171,9 +171,7 @@ def swing_left(loop: Loop, answer: Answer, time: float, factor: float) -> float:
     """
     count = int(HORIZON * time / loop.clock.step)
     free = dataclasses.replace(
-        loop,
-        valve=loop.valve.without_friction(),
-        controller=loop.controller.scaled(factor),
+        loop, valve=loop.valve.without_friction(), controller=loop.controller.scaled(factor)
     )
     signals = Signals.quiet(count, loop.rest)
     load = np.full(count, PUSH / answer.load)

@@ -10,11 +10,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records.valve_work import ValveWork, largest_op_step
 from stiction_ros.report.run.scoring import offset
 from stiction_ros.signals.holds import holds
-from stiction_ros.signals.oscillation import (
-    LEAST_LINE,
-    amplitude,
-    dominant_cycle,
-)
+from stiction_ros.signals.oscillation import LEAST_LINE, amplitude, dominant_cycle
 from stiction_studies.examples.control_study import COLUMNS, ColumnRun, Trial
 
 

@@ -13,16 +13,8 @@ from stiction_ros.report.page import table
 from stiction_studies.paper.exhibit import Exhibit
 from stiction_studies.paper.figures import controllers, responses, trends
 from stiction_studies.paper.sources import Sources
-from stiction_studies.paper.tables import (
-    constants,
-    laws,
-    methods,
-    models,
-    wells,
-)
-from stiction_studies.paper.tables import (
-    controllers as control_tables,
-)
+from stiction_studies.paper.tables import constants, laws, methods, models, wells
+from stiction_studies.paper.tables import controllers as control_tables
 
 PAGE = "paper.html"
 HEAD = ("", "printed", "ours", "remark")

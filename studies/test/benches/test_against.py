@@ -79,10 +79,7 @@ def test_ratios_are_those_of_the_other_tree_over_this_one(trees: tuple[Path, Pat
 
 def test_what_one_tree_alone_measures_is_told(trees: tuple[Path, Path]) -> None:
     ran = alternate(["bench", "control"], trees[1], 1, lambda share, text: None)
-    assert ran.alone() == [
-        f"{HERE} alone has new case (SE)",
-        f"{THERE} alone has old case (SE)",
-    ]
+    assert ran.alone() == [f"{HERE} alone has new case (SE)", f"{THERE} alone has old case (SE)"]
 
 
 def test_trees_take_turns_and_change_who_begins(trees: tuple[Path, Path]) -> None:

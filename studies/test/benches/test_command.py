@@ -10,12 +10,7 @@ import pytest
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
 from stiction_studies.benches.speed import identification as bench_identification
-from stiction_studies.benches.speed.identification import (
-    FULL,
-    Duel,
-    Plan,
-    identification,
-)
+from stiction_studies.benches.speed.identification import FULL, Duel, Plan, identification
 from stiction_studies.examples import Example, example1
 
 TINY = Plan(
@@ -81,9 +76,7 @@ def test_both_methods_of_the_paper_meet_the_same_runs(document: dict[str, Any]) 
 
 
 @pytest.mark.trial
-def test_longer_records_are_measured_against_proportional_growth(
-    document: dict[str, Any],
-) -> None:
+def test_longer_records_are_measured_against_proportional_growth(document: dict[str, Any]) -> None:
     short, long = rows_of(document, "N = ")
     assert short["ratio"] == 1.0
     assert long["baseline_ms"] == pytest.approx(2.0 * short["subject_ms"])
@@ -103,10 +96,7 @@ def test_more_valves_are_measured_against_so_many_times_one(document: dict[str, 
 @pytest.mark.trial
 def test_the_paper_s_methods_are_run_in_full_and_tell_their_work(document: dict[str, Any]) -> None:
     nlp, grid, *_ = rows_of(document, "Example 1")
-    assert (nlp["baseline"], grid["baseline"]) == (
-        "paper's NLP, M = 1",
-        "paper's grid, step 4 %",
-    )
+    assert (nlp["baseline"], grid["baseline"]) == ("paper's NLP, M = 1", "paper's grid, step 4 %")
     assert " solves, " in nlp["note"]
     assert " points, all of them worked through" in grid["note"]
     assert "extrapolated" not in nlp["note"] + grid["note"]

@@ -4,13 +4,7 @@ import dataclasses
 from typing import Any
 
 from stiction_studies.faults.fault import Fault, nothing
-from stiction_studies.faults.observation import (
-    BagFound,
-    Known,
-    Observation,
-    Sampled,
-    Shown,
-)
+from stiction_studies.faults.observation import BagFound, Known, Observation, Sampled, Shown
 from stiction_studies.faults.terms import Notice, Pace, Phase
 
 PERIOD = 0.04

@@ -13,10 +13,7 @@ from stiction_ros.effects import Backlash, Behaviour, HeStiction, StepDisturbanc
 def added(place: str, behaviour: Behaviour, point: list[float], *factors: float) -> AddedEffect:
     """Return an effect by what is asked of it here."""
     candidate = types.SimpleNamespace(
-        place=place,
-        effect=behaviour.effect,
-        key=(place, behaviour.effect),
-        dated=bool(factors),
+        place=place, effect=behaviour.effect, key=(place, behaviour.effect), dated=bool(factors)
     )
     fit = types.SimpleNamespace(
         candidate=candidate, point=np.array(point), factors=np.array(factors)

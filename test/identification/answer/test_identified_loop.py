@@ -132,10 +132,7 @@ def test_a_process_too_slow_for_its_record_rests_at_the_mean(
     # A pole and a zero that all but cancel: PV would creep far away for thousands of samples.
     a, b = model.a[0], model.b["V1"][0]
     slow = dataclasses.replace(
-        model,
-        a=(a - 0.99999, -0.99999 * a),
-        b={"V1": (b, -0.9999 * b)},
-        bias=1e-5 * model.bias,
+        model, a=(a - 0.99999, -0.99999 * a), b={"V1": (b, -0.9999 * b)}, bias=1e-5 * model.bias
     )
     loop = identified_loop(record, dataclasses.replace(found, outputs=(slow,)), "slow")
     assert loop.pv0 == pytest.approx(record.pv.mean(axis=0))

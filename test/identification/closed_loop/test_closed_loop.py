@@ -4,10 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from known_loops import Kind, Known, changed, known
 
-from stiction_ros.identification.closed_loop.closed_loop import (
-    ClosedLoop,
-    close_loop,
-)
+from stiction_ros.identification.closed_loop.closed_loop import ClosedLoop, close_loop
 from stiction_ros.loop.damping import ringing
 from stiction_ros.loop.linear_loops import Process
 

@@ -6,11 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from known_loops import Kind, Known, changed, known
 
-from stiction_ros.identification.closed_loop.closed_loop import (
-    ClosedLoop,
-    OutputLoop,
-    close_loop,
-)
+from stiction_ros.identification.closed_loop.closed_loop import ClosedLoop, OutputLoop, close_loop
 from stiction_ros.identification.closed_loop.explanation import cause as cause_of
 from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.result.cause import Cause, CauseKind

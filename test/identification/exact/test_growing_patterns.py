@@ -93,9 +93,7 @@ def test_op_that_rests_has_no_first_slip() -> None:
     assert first_slips(np.zeros(50)) == []
 
 
-def test_a_record_whose_op_rests_at_first_keeps_its_model(
-    loop: tuple[Data, Model, Orders],
-) -> None:
+def test_a_record_whose_op_rests_at_first_keeps_its_model(loop: tuple[Data, Model, Orders]) -> None:
     data, model, orders = loop
     still = dataclasses.replace(data, u=np.where(np.arange(600) < 590, 0.0, data.u))
     assert growing_patterns(still, model, orders, 0) is model

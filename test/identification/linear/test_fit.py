@@ -212,13 +212,7 @@ def test_unstable_model_makes_no_loop() -> None:
         found.loop_model("x")
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"output_order": 2},
-        {"kind": LinearKind.ARX, "order": 2},
-    ],
-)
+@pytest.mark.parametrize("wrong", [{"output_order": 2}, {"kind": LinearKind.ARX, "order": 2}])
 def test_options_of_another_kind_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(InputError):
         LinearOptions(**wrong)  # type: ignore[arg-type]

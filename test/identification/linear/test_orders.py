@@ -5,11 +5,7 @@ import numpy as np
 import pytest
 
 from stiction_ros.errors import InputError
-from stiction_ros.identification.linear.data import (
-    LinearData,
-    OrderCriterion,
-    prepare_linear,
-)
+from stiction_ros.identification.linear.data import LinearData, OrderCriterion, prepare_linear
 from stiction_ros.identification.linear.orders import OrderOptions, choose_orders
 
 A, B = (-1.5, 0.7), ((0.05, 0.03),)
@@ -51,10 +47,7 @@ def test_two_valves_have_delays_of_their_own() -> None:
     assert choice.fit.delays == (5, 1)
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [{"output": ()}, {"delay": (3, 1)}, {"delay": (-1, 1)}],
-)
+@pytest.mark.parametrize("wrong", [{"output": ()}, {"delay": (3, 1)}, {"delay": (-1, 1)}])
 def test_options_are_checked(wrong: dict[str, object]) -> None:
     with pytest.raises(InputError):
         OrderOptions(**wrong)  # type: ignore[arg-type]

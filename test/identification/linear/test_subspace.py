@@ -209,10 +209,7 @@ def test_options_out_of_range_are_refused(wrong: dict[str, object]) -> None:
         SubspaceOptions(**wrong)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("options", "where"),
-    [({"delay": (1, 1)}, "delay"), ({"order": 60}, "x")],
-)
+@pytest.mark.parametrize(("options", "where"), [({"delay": (1, 1)}, "delay"), ({"order": 60}, "x")])
 def test_what_does_not_fit_the_record_is_refused(options: dict[str, object], where: str) -> None:
     random = np.random.default_rng(6)
     record = systems.experiment(systems.random_system(random, 1, 1, 1), random, 120)

@@ -65,11 +65,7 @@ def test_simulated_loops(make: object, variant: str, seed: int) -> None:
     assert found.rule is SwapRule.CONTROLLER
 
 
-@given(
-    seed=st.integers(0, 1000),
-    gain=st.floats(0.05, 3.0),
-    integral=st.floats(3.0, 200.0),
-)
+@given(seed=st.integers(0, 1000), gain=st.floats(0.05, 3.0), integral=st.floats(3.0, 200.0))
 def test_any_pi_controller_is_told_from_its_process(
     seed: int, gain: float, integral: float
 ) -> None:

@@ -86,7 +86,7 @@ def test_the_forecast_of_an_ideal_valve_goes_with_op(answered: Judgement) -> Non
 def test_the_mapping_has_the_keys_of_the_contract() -> None:
     told = first_round(FACTS).to_dict()
     assert list(told) == [
-        *("valve", "start", "moves", "duration", "pv_limit", "return_op", "expected", "sentence"),
+        *("valve", "start", "moves", "duration", "pv_limit", "return_op", "expected", "sentence")
     ]
     assert told["moves"][1] == {"after": 20.0, "op": 49.6}
     assert told["expected"] == {"pv_move": pytest.approx(2.0), "decides_above": SMALLEST}

@@ -59,10 +59,7 @@ def test_a_rounded_controller_is_told_by_its_answer_to_pv() -> None:
 
 @pytest.mark.parametrize(
     ("op", "told"),
-    [
-        (np.full(100, 50.0), "makes 0 steps"),
-        (path(hold=SHORTEST - 1), "rests for 6 samples"),
-    ],
+    [(np.full(100, 50.0), "makes 0 steps"), (path(hold=SHORTEST - 1), "rests for 6 samples")],
 )
 def test_the_refusal_says_why(op: FloatArray, told: str) -> None:
     assert told in Steps.of(op).refusal(np.zeros(len(op)))

@@ -621,12 +621,7 @@ def test_an_offer_that_fails_in_any_way_does_not_end_the_loop(
 def test_intervals_that_are_no_numbers_are_not_taken() -> None:
     document = KNOWN.to_mapping()
     document["provenance"] = [
-        {
-            "valve": "V1",
-            "effect": "stiction",
-            "f_s_interval": [0, 10**400],
-            "f_d_interval": [0, 1],
-        }
+        {"valve": "V1", "effect": "stiction", "f_s_interval": [0, 10**400], "f_d_interval": [0, 1]}
     ]
     run = Run(LiveController(SETTINGS, PROCESS))
     run.go(10)
@@ -774,11 +769,7 @@ def test_retuning_does_not_drop_an_offer_that_waits() -> None:
 
 @pytest.mark.parametrize(
     "bad",
-    [
-        {"move_weights": (1.0, 1.0)},
-        {"pv_low": (5.0,), "pv_high": (4.0,)},
-        {"output_weights": ()},
-    ],
+    [{"move_weights": (1.0, 1.0)}, {"pv_low": (5.0,), "pv_high": (4.0,)}, {"output_weights": ()}],
 )
 def test_settings_that_do_not_fit_are_refused_and_leave_the_old_ones(
     bad: dict[str, object],

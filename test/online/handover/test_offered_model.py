@@ -23,10 +23,7 @@ BAD = {
     "deep": ("loop: " + "[" * 5000, "deeper"),
     "deep and closed": ("loop: " + "[" * 30 + "]" * 30, "deeper"),
     "many keys": ("\n".join(f"k{i}: 1" for i in range(4000)), "keys and values"),
-    "aliases": (
-        "a: &a [1, 1]\nb: &b [*a, *a]\nc: &c [*b, *b]\nd: [*c, *c]\n",
-        "aliases",
-    ),
+    "aliases": ("a: &a [1, 1]\nb: &b [*a, *a]\nc: &c [*b, *b]\nd: [*c, *c]\n", "aliases"),
     "an alias within itself": ("a: &a [*a]", "aliases"),
     "a merge": ("a: &a {x: 1}\nb:\n  <<: *a\n", "aliases"),
     "a python object": ("loop: !!python/object/apply:os.system [ls]", "no valid YAML"),

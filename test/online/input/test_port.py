@@ -89,12 +89,7 @@ class Feed:
 
 # rules, events (kind, stamp, value), samples, counts
 LOCKSTEP_TABLE: dict[str, tuple[str, list[tuple[Any, ...]], str, dict[str, int]]] = {
-    "in order": (
-        "scheduled",
-        [("sp", 1), ("pv", 1), ("sp", 2), ("pv", 2)],
-        "^1+ 2+",
-        {},
-    ),
+    "in order": ("scheduled", [("sp", 1), ("pv", 1), ("sp", 2), ("pv", 2)], "^1+ 2+", {}),
     "pv before sp": ("scheduled", [("pv", 1), ("sp", 1), ("pv", 2), ("sp", 2)], "^1+ 2+", {}),
     "sp of another stamp": ("scheduled", [("sp", 1), ("pv", 2)], "", {}),
     "oldest first": ("scheduled", [("pv", 2), ("pv", 1), ("sp", 1), ("sp", 2)], "^1+ 2+", {}),
@@ -173,12 +168,7 @@ LOCKSTEP_TABLE: dict[str, tuple[str, list[tuple[Any, ...]], str, dict[str, int]]
         "^1+ 2+",
         {"refused sp": 1},
     ),
-    "dv is no number": (
-        "dv",
-        [("sp", 0), ("dv", 1, NAN), ("pv", 1)],
-        "^1+",
-        {"refused dv": 1},
-    ),
+    "dv is no number": ("dv", [("sp", 0), ("dv", 1, NAN), ("pv", 1)], "^1+", {"refused dv": 1}),
     "a plant begun anew that shows its sample again": (
         "scheduled",
         [("sp", 90), ("pv", 90), *[("sp", 1), ("pv", 1)] * SUCCESSION, ("sp", 2), ("pv", 2)],
@@ -251,11 +241,7 @@ REALTIME_TABLE: dict[str, tuple[list[tuple[Any, ...]], str, dict[str, int]]] = {
     "swapped and late": ([(4, "pv", 4), (4, "pv", 3)], "3-? 4+", {"missing": 1, "late": 1}),
     "one lost": ([(4, "pv", 4)], "3-? 4+", {"missing": 1}),
     "sp of another stamp": ([(3, "sp", 2.7), (3, "pv", 3)], "3+", {}),
-    "beside the grid": (
-        [(3, "pv", 3.3), (4, "pv", 4), (5, "pv", 4.7)],
-        "3.3+ 4+ 4.7+",
-        {},
-    ),
+    "beside the grid": ([(3, "pv", 3.3), (4, "pv", 4), (5, "pv", 4.7)], "3.3+ 4+ 4.7+", {}),
     "a stale one": ([(2.5, "pv", 1), (3, "pv", 3)], "3+", {"stale": 1}),
     "stamp 0": ([(2.5, "pv", 0), (3, "pv", 3)], "3+", {"stale": 1}),
     "the same again": ([(2.5, "pv", 2), (3, "pv", 3)], "3+", {"stale": 1}),
@@ -332,11 +318,7 @@ REALTIME_TABLE: dict[str, tuple[list[tuple[Any, ...]], str, dict[str, int]]] = {
         "3-? 4+?",
         {"blind": 2},
     ),
-    "late": (
-        [(4.1, "tick", 0), (4.2, "pv", 3), (4.3, "pv", 4)],
-        "3+? 4+",
-        {"blind": 1, "late": 1},
-    ),
+    "late": ([(4.1, "tick", 0), (4.2, "pv", 3), (4.3, "pv", 4)], "3+? 4+", {"blind": 1, "late": 1}),
     "late for good": (
         [(4.2, "queued", 4), (4.2, "pv", 3), (4.3, "pv", 3)],
         "3- 4+",

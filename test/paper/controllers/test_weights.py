@@ -22,8 +22,7 @@ MODEL = TANK.process.linear(60.0)
 
 
 @pytest.mark.parametrize(
-    ("preset", "largest"),
-    [(WeightPreset.PRINTED, 11.0733**2), (WeightPreset.CORRECTED, 1.1241**2)],
+    ("preset", "largest"), [(WeightPreset.PRINTED, 11.0733**2), (WeightPreset.CORRECTED, 1.1241**2)]
 )
 def test_q_of_unaware_control(preset: WeightPreset, largest: float) -> None:
     weights = unaware_weights(preset, MODEL, 50)

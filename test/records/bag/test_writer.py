@@ -115,9 +115,7 @@ def test_metadata_counts_and_qos_agree_with_the_channels(bag: Bag) -> None:
 @given(
     st.lists(
         st.tuples(
-            st.sampled_from(["/a", "/b", "/unit/c"]),
-            st.integers(0, 2**62),
-            st.binary(max_size=300),
+            st.sampled_from(["/a", "/b", "/unit/c"]), st.integers(0, 2**62), st.binary(max_size=300)
         ),
         max_size=60,
     ),

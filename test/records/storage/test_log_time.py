@@ -40,9 +40,7 @@ def test_two_clocks_that_alternate_are_the_later_one() -> None:
 
 
 @given(st.lists(st.tuples(st.booleans(), st.integers(0, 40)), max_size=200))
-def test_it_never_runs_backwards_once_time_is_simulated(
-    events: list[tuple[bool, int]],
-) -> None:
+def test_it_never_runs_backwards_once_time_is_simulated(events: list[tuple[bool, int]]) -> None:
     times = LogTime()
     found, simulated = [], False
     for is_clock, stamp in events:

@@ -169,10 +169,7 @@ def _unaware_rows(loop: Loop, count: int) -> list[Row]:
 def _pair(loop: Loop, count: int, horizon: int) -> list[Row]:
     """Compare the quadratic programmes with the nonlinear ones at one horizon."""
     case = f"tank, N_H = {horizon}"
-    return [
-        _quadratic_row(case, loop, count, horizon),
-        _embedding_row(case, loop, count, horizon),
-    ]
+    return [_quadratic_row(case, loop, count, horizon), _embedding_row(case, loop, count, horizon)]
 
 
 def _valve_rows(valves: int, plan: ControlPlan) -> list[Row]:

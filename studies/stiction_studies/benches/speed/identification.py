@@ -215,11 +215,7 @@ def fight(plan: Plan, duel: Duel, begin: Callable[[str], Progress]) -> list[Row]
             nlp,
             f"{log.solves} solves, {log.capped} of them ended at their limit of iterations",
         ),
-        (
-            f"paper's grid, step {step:g} %",
-            grid,
-            f"{points} points, all of them worked through",
-        ),
+        (f"paper's grid, step {step:g} %", grid, f"{points} points, all of them worked through"),
     ]
     if step > EQUAL:
         said = f"{fine} points at the cost of one of the {points} that were worked through"
@@ -276,10 +272,7 @@ def grow_valves(plan: Plan, begin: Callable[[str], Progress]) -> list[Row]:
 
 
 def timed(
-    example: Example,
-    options: IdentificationOptions | PaperOptions,
-    repeat: int,
-    progress: Progress,
+    example: Example, options: IdentificationOptions | PaperOptions, repeat: int, progress: Progress
 ) -> Timed:
     """Identify ``repeat`` times, or fewer where one run takes longer than ``PATIENCE``.
 

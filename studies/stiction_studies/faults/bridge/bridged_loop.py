@@ -27,10 +27,7 @@ LIMITS = (35.0, 65.0)  # %
 FRICTION = {"effect": "stiction", "law": "he", "f_s": 8.0, "f_d": 1.0}  # of V1, as it is
 SET_POINTS = {  # a move every two seconds: OP never rests
     "repeat": 2400.0,
-    "moves": [
-        {"time": 0.0, "C": 7.5, "T": 42.324},
-        {"time": 1200.0, "C": 7.58, "T": 43.0},
-    ],
+    "moves": [{"time": 0.0, "C": 7.5, "T": 42.324}, {"time": 1200.0, "C": 7.58, "T": 43.0}],
 }
 STARTED = ("recorder", "controller", "opcua")
 ENDED = ("opcua", "controller", "recorder")

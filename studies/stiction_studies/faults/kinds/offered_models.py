@@ -153,10 +153,7 @@ FAULTS = (
     Fault("model-giant", f"a model of 20 MB {REFUSED}", offered(giant, 3.0)),
     Fault("model-many-keys", f"a model of 300 000 keys {REFUSED}", offered(many_keys, 2.0)),
     Fault(
-        "model-deep",
-        f"a model of 20 000 levels {REFUSED}",
-        offered(deep),
-        phases=(Phase.AFTER,),
+        "model-deep", f"a model of 20 000 levels {REFUSED}", offered(deep), phases=(Phase.AFTER,)
     ),
     Fault(
         "model-nonsense",

@@ -24,11 +24,7 @@ LEAD = 300
 
 FAR = 1e9
 
-CURVES = {
-    "": kernels.EXPONENTIAL,
-    "quadratic": kernels.QUADRATIC,
-    "in a line": kernels.IN_A_LINE,
-}
+CURVES = {"": kernels.EXPONENTIAL, "quadratic": kernels.QUADRATIC, "in a line": kernels.IN_A_LINE}
 """Of a characteristic, by its law."""
 
 

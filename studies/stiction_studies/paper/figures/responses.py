@@ -29,9 +29,7 @@ def figure2(sources: Sources) -> Exhibit:
     """Return Example 1: P(s) and what was identified of it."""
     count = SAMPLES[1]
     printed = step_response(
-        {"a": THETA_1_A, "b": {"V1": THETA_1_B}, "delay": {"V1": THETA_1_DELAY}},
-        "V1",
-        count,
+        {"a": THETA_1_A, "b": {"V1": THETA_1_B}, "delay": {"V1": THETA_1_DELAY}}, "V1", count
     )
     actual = true_response(sources.example(1).truth, 0, 0, 600)[-1]
     rows = [*friction_rows(sources, 1)]

@@ -7,12 +7,7 @@ from stiction_ros.paper.controllers.weights import ProgrammeCost, WarmStart
 from stiction_ros.paper.methods import identify
 from stiction_studies.examples import example2_of_one_round
 from stiction_studies.examples.control_study import COLUMNS, Column, StudyOptions, run_trial
-from stiction_studies.pages.control_scores import (
-    ColumnScore,
-    cycle_period,
-    mean_score,
-    score_trial,
-)
+from stiction_studies.pages.control_scores import ColumnScore, cycle_period, mean_score, score_trial
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import EXAMPLES
 from stiction_studies.paper.sources import Sources

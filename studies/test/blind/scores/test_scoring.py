@@ -69,11 +69,7 @@ CASES = {
     "its twin named": (LOAD, answer("named", effect(BIAS)), Score.WRONG),
     "its family": (LOAD, answer("ambiguous", effect(BIAS, STEP)), Score.RIGHT),
     "more than its family": (LOAD, answer("ambiguous", effect(STEP, BIAS, GAIN)), Score.DOUBT),
-    "less than its family": (
-        FRICTION,
-        answer("ambiguous", effect(STICTION, GAIN)),
-        Score.DOUBT,
-    ),
+    "less than its family": (FRICTION, answer("ambiguous", effect(STICTION, GAIN)), Score.DOUBT),
     "a set without it": (LOAD, answer("ambiguous", effect(STICTION, BACKLASH)), Score.LOST),
     "a loose set": (LOAD, answer("ambiguous", loose=(STEP, BIAS)), Score.RIGHT),
     "a loose set besides": (
@@ -144,11 +140,7 @@ def test_a_named_effect_has_no_alternatives() -> None:
 
 
 FAMILIES = {
-    ("valve:V1", "lag"): {
-        ("valve:V1", "lag"),
-        ("process:PV1", "pole"),
-        ("sensor:PV1", "lag"),
-    },
+    ("valve:V1", "lag"): {("valve:V1", "lag"), ("process:PV1", "pole"), ("sensor:PV1", "lag")},
     ("process:PV1", "gain"): {GAIN},
     ("sensor:PV1", "drift"): {
         ("sensor:PV1", "drift"),

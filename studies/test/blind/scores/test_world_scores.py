@@ -159,9 +159,7 @@ def test_intervals_are_given_the_slack_of_their_definition(
     assert row.covered == {"lag.tau": holds}
 
 
-def test_an_end_that_is_never_reached_and_mechanics_have_nothing_to_cover(
-    loop: HiddenLoop,
-) -> None:
+def test_an_end_that_is_never_reached_and_mechanics_have_nothing_to_cover(loop: HiddenLoop) -> None:
     row = judged(
         loop, (ENDS,), said(effect(VALVE, "saturation", low=(10.0, 20.0), high=(60.0, 62.0)))
     )

@@ -114,9 +114,7 @@ def test_friction_holds_the_stem_and_a_load_adds_to_it() -> None:
     assert by_load.clean == pytest.approx(free.clean)
 
 
-def test_a_recorded_stem_is_where_the_valve_stands_after_each_op(
-    loops: list[HiddenLoop],
-) -> None:
+def test_a_recorded_stem_is_where_the_valve_stands_after_each_op(loops: list[HiddenLoop]) -> None:
     shown = [loop for loop in loops if loop.record.stem is not None]
     assert 0 < len(shown) < 15
     for loop in shown:
