@@ -31,8 +31,8 @@ from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.gain.draws import Draws
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
-from stiction_ros.identification.friction.grid import find_law
-from stiction_ros.identification.result.identification import ValveEstimate
+from stiction_ros.identification.friction import find_law
+from stiction_ros.identification.result import ValveEstimate
 from stiction_ros.loop import LoopModel
 
 MARGIN = 0.3

@@ -10,7 +10,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification.identification_options import limited
 from stiction_ros.identification.linear.data import nrmse_fit
 from stiction_ros.identification.problem import input_checks
-from stiction_ros.identification.result import identification
+from stiction_ros.identification.result import FitStatus, OutputModel, ValveEstimate, VerdictKind
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification, SearchLog, SolvedStart
 from stiction_ros.paper.smoothed_laws import smooth_law
@@ -143,7 +143,7 @@ def result(
         if delay == high > low
     ]
     return PaperIdentification(
-        status=identification.FitStatus.NO_MODEL if answer.reason else identification.FitStatus.OK,
+        status=FitStatus.NO_MODEL if answer.reason else FitStatus.OK,
         reason=answer.reason,
         method=options.method,
         samples=len(record),
@@ -169,13 +169,13 @@ def valve_estimate(
     stem: FloatArray,
     limit: float,
     law: str = "he",
-) -> identification.ValveEstimate:
+) -> ValveEstimate:
     """Return a point estimate: undecided, with intervals from 0 to f_max, as f_D ≤ f_S."""
     static, dynamic = float(friction[0]), float(min(friction[0], friction[1]))
     moves = int(np.count_nonzero(np.abs(np.diff(stem)) > 1e-9 * max(limit, 1e-300)))
-    return identification.ValveEstimate(
+    return ValveEstimate(
         name=record.valves[valve],
-        verdict=identification.VerdictKind.UNDECIDED,
+        verdict=VerdictKind.UNDECIDED,
         law=law,
         static_friction=static,
         static_interval=(0.0, max(limit, static)),
@@ -190,14 +190,14 @@ def valve_estimate(
 
 def output_model(
     record: Record, output: int, fit: ArxFit, stems: FloatArray, orders: ArxOrders
-) -> identification.OutputModel:
+) -> OutputModel:
     """Return one output's model with its one-step and its free-run fit."""
     y = record.pv[:, output]
     first, tail = orders.first, y[orders.first :]
     past, inputs = orders.of_output(output, len(stems))
     free_parameters = past + sum(inputs) + 1
     variance = fit.squared_error / max(len(tail) - free_parameters, 1)
-    return identification.OutputModel(
+    return OutputModel(
         name=record.outputs[output],
         a=tuple(map(float, fit.a[:past])),
         b={

@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.judgement.figures import Figures, definitions
-from stiction_ros.identification.judgement.probability import (
+from stiction_ros.identification.judgement import (
+    Figures,
     Model,
     Node,
+    VerdictKind,
+    definitions,
     friction_probability,
     verdict_of,
 )
-from stiction_ros.identification.judgement.verdict_kind import VerdictKind
 
 TREES, LEAVES, RATE = 150, 12, 0.08
 """Of the boosting. In eight-fold trials on seeds 0:399 of four worlds 100 trees predict as well and

@@ -7,8 +7,8 @@ import pytest
 from gap_loops import loop, record
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.fit.kept_back import with_surprises_fitted
 from stiction_ros.discrepancy.simulation.free_run import PHASES, FreeRun, Runs, join_records
+from stiction_ros.discrepancy.steps.begin import with_surprises_fitted
 
 
 def with_blow(at: int | None) -> Runs:

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from stiction_ros.discrepancy import GapOptions, GapVerdict, find_discrepancy
 from stiction_ros.discrepancy.data.controller_check import check_controller, unseen_of
 from stiction_ros.discrepancy.data.gate import open_gate
-from stiction_ros.discrepancy.likelihood.seen_noise import Unseen, seen_noise
+from stiction_ros.discrepancy.likelihood.declared_noise import Unseen, seen_noise
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record

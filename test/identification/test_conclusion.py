@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from stiction_ros.effects import HeStiction
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
-from stiction_ros.identification.inference.verdict import DEADBAND, SMALL_JUMP, judge
+from stiction_ros.identification.conclusion import DEADBAND, SMALL_JUMP, judge
 
 CLEAR = {"delta_bic": 60.0, "half_1": 30.0, "half_2": 30.0, "moves": 40.0, "deadband_loss": 50.0}
 STICKY, BACKLASH, HEALTHY, UNDECIDED = VerdictKind

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.effects import FloatArray
-from stiction_ros.identification.friction.grid import coarse_grid, cross_grid, even_grid, finer_grid
+from stiction_ros.identification.friction import coarse_grid, cross_grid, even_grid, finer_grid
 
 
 def inside(grid: FloatArray, limit: float) -> bool:

@@ -8,14 +8,103 @@ from typing import Any, Self
 
 from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
-from stiction_ros.identification.friction.further import first_values
-from stiction_ros.identification.friction.grid import behaviour_of, find_law
-from stiction_ros.identification.judgement.figures import Figures
-from stiction_ros.identification.judgement.verdict_kind import VerdictKind
-from stiction_ros.identification.result.cause import Cause
-from stiction_ros.identification.result.stability import Stability
+from stiction_ros.identification.friction import behaviour_of, find_law, first_values
+from stiction_ros.identification.judgement import Figures, VerdictKind
 
+Interval = tuple[float, float]
 __all__ = ["FitStatus", "Identification", "OrderRow", "OutputModel", "ValveEstimate", "VerdictKind"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Look:
+    """One way of looking at a record."""
+
+    name: str  # for people, such as ``rows of 4 s`` or ``first half``
+    gain: float  # −2 log likelihood that friction adds there
+    agrees: bool  # whether this look alone speaks for what is told of the valve
+    # f_S + f_D that it does not reject, %; None where it takes the friction of the whole
+    band: Interval | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return an entry of ``stability.tried`` of ``identify --json``."""
+        band = None if self.band is None else list(self.band)
+        return {"look": self.name, "gain": self.gain, "band": band, "agrees": self.agrees}
+
+
+@dataclasses.dataclass(frozen=True)
+class Stability:
+    """What was tried beside the answer, and what of it agreed.
+
+    A valve that is told to be healthy is agreed on by looks that see no friction; whatever else
+    is told, by looks that see the friction that stands beside it.
+    """
+
+    tried: tuple[Look, ...]  # at least one
+
+    @property
+    def agreed(self) -> tuple[str, ...]:
+        """Names of the looks that agree."""
+        return tuple(look.name for look in self.tried if look.agrees)
+
+    @property
+    def share(self) -> float:
+        """Share of the looks that agree, 0 to 1."""
+        return len(self.agreed) / len(self.tried)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return ``valves[].stability`` of ``identify --json``."""
+        return {"tried": [look.to_dict() for look in self.tried], "agreed": list(self.agreed)}
+
+
+def halves(gains: Interval, unheard: float | None) -> tuple[Look, ...]:
+    """Return the looks at both halves of the record.
+
+    Args:
+        gains: −2 log likelihood that the friction of the whole adds in either half.
+        unheard: gain up to which a half speaks for a healthy valve; None where friction is told,
+            which each half must see.
+    """
+    return tuple(
+        Look(name, gain, gain > 0.0 if unheard is None else gain <= unheard)
+        for name, gain in zip(("first half", "second half"), gains, strict=True)
+    )
+
+
+class CauseKind(enum.StrEnum):
+    """What an oscillation comes from.
+
+    ``VALVE``: the friction that was identified. ``TUNING``: controller and process ring
+    without it. ``DISTURBANCE``: a wave that enters behind the valve. ``SET_POINT``: moves of
+    the set-point. ``NONE``: there is no regular oscillation. ``UNKNOWN``: there is one and
+    nothing explains it.
+    """
+
+    VALVE = "valve"
+    TUNING = "tuning"
+    DISTURBANCE = "disturbance"
+    SET_POINT = "set_point"
+    NONE = "none"
+    UNKNOWN = "unknown"
+
+
+@dataclasses.dataclass(frozen=True)
+class Cause:
+    """Why one output oscillates."""
+
+    kind: CauseKind  # see ``CauseKind``
+    period: float | None  # of PV − SP, s; None where nothing stands out
+    regularity: float  # above 1 is regular, see ``stiction_ros.signals.oscillation``
+    amplitude: float  # √2 × RMS of the line at this period, engineering units
+    sentence: str  # for people
+
+    def to_dict(self) -> dict[str, str | float | None]:
+        """Return the mapping of ``identify --json``."""
+        return {
+            "kind": self.kind.value,
+            "period": self.period,
+            "regularity": self.regularity,
+            "amplitude": self.amplitude,
+        }
 
 
 class FitStatus(enum.StrEnum):
@@ -44,7 +133,7 @@ class ValveEstimate:
     jump: float
     stem_start: float  # stem position before the first sample, %
     moves: int  # number of samples at which the estimated stem moved
-    # named figures behind the verdict, see ``stiction_ros.identification.inference.verdict``
+    # named figures behind the verdict, see ``stiction_ros.identification.conclusion``
     evidence: Mapping[str, float]
     # rows (f_S, least −2 log likelihood above the best) over the patterns that were tried, f_S in %
     profile: tuple[tuple[float, float], ...] = ()

@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.identification import VerdictKind
-from stiction_ros.identification.judgement.figures import Figures, definitions
-from stiction_ros.identification.judgement.probability import (
+from stiction_ros.identification.judgement import (
     SURE,
+    Figures,
     contributions,
+    definitions,
     fitted_model,
     friction_probability,
     verdict_of,

@@ -1,4 +1,6 @@
-"""Is there friction? Friction against no friction, each with its own best linear part.
+"""From the final model to a verdict and a result in engineering units.
+
+Friction is held against no friction, each with its own best linear part.
 
 Evidence, all under the noise model:
 
@@ -19,9 +21,19 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.problem.models import Model
-from stiction_ros.identification.result.identification import VerdictKind
-from stiction_ros.identification.result.stability import Interval
+from stiction_ros.identification.linear.data import nrmse_fit
+from stiction_ros.identification.problem.models import Data, Model
+from stiction_ros.identification.problem.output_error import OutputFit
+from stiction_ros.identification.result import (
+    FitStatus,
+    Identification,
+    Interval,
+    OrderRow,
+    OutputModel,
+    ValveEstimate,
+    VerdictKind,
+)
+from stiction_ros.records.record import Record
 
 DEADBAND = 4.0
 """−2 log likelihood below which a deadband (J = 0) is not rejected: two standard deviations of the
@@ -29,6 +41,72 @@ one parameter that it has less."""
 SMALL_JUMP = 0.25
 """Jump, as a share of f_S + f_D, up to which friction is a deadband: a stem that is moved by the
 controller's own kicks tells f_S + f_D alone, and any jump may go with it."""
+
+
+def conclude(
+    record: Record,
+    data: Data,
+    model: Model,
+    valves: tuple[ValveEstimate, ...],
+    orders: tuple[OrderRow, ...],
+    remarks: tuple[str, ...] = (),
+) -> Identification:
+    """Return the result in engineering units, seconds still to be told.
+
+    Args:
+        record, data: as measured, and made ready.
+        model: the final one.
+        valves: the estimates.
+        orders: all that were compared.
+        remarks: sentences for people on ambiguities and on what is exact.
+    """
+    stem = model.stems.T + record.op.mean(axis=0)
+    stem.flags.writeable = False
+    outputs = tuple(output_model(record, i, fit, data) for i, fit in enumerate(model.fits))
+    notes = [*record.notes, *remarks]
+    for j, tag in enumerate(record.valves):
+        if record.op[:, j].min() < 0.0 or record.op[:, j].max() > 100.0:
+            notes.append(f"op of {tag} lies outside 0 to 100 %; friction is in the op's own units")
+    notes += [
+        f"the delay from valve {valve} to {output.name} is the longest tried; widen --delay"
+        for output in outputs
+        for valve, delay in output.delay.items()
+        if delay == data.delay[1] > data.delay[0]
+    ]
+    usable = all(np.isfinite(fit.loss) for fit in model.fits)
+    return Identification(
+        status=FitStatus.OK if usable else FitStatus.NO_MODEL,
+        reason="" if usable else "no output could be fitted",
+        method="exact",
+        samples=len(record),
+        sample_time=record.sample_time,
+        seconds=0.0,
+        valves=tuple(valve.with_own_jump() for valve in valves),
+        outputs=outputs,
+        stem=stem,
+        notes=tuple(notes),
+        orders=orders,
+    )
+
+
+def output_model(record: Record, i: int, fit: OutputFit, data: Data) -> OutputModel:
+    """Return one output's model in engineering units, equation (9) with a constant."""
+    mean, scale = float(record.pv[:, i].mean()), float(record.pv[:, i].std())
+    b = fit.b * scale
+    bias = fit.constant * scale + float(fit.a.sum()) * mean
+    bias -= float(b.sum(axis=1) @ record.op.mean(axis=0))
+    y = data.y[i]
+    tail = y[len(y) - fit.count :]
+    return OutputModel(
+        name=record.outputs[i],
+        a=tuple(float(value) for value in fit.a[1:]),
+        b={tag: tuple(map(float, row)) for tag, row in zip(record.valves, b, strict=True)},
+        delay=dict(zip(record.valves, fit.delays, strict=True)),
+        bias=bias,
+        noise_std=float(np.sqrt(fit.energy / max(fit.count - fit.parameters, 1))) * scale,
+        fit_one_step=nrmse_fit(tail, tail - fit.innovations),
+        fit_free_run=nrmse_fit(y[len(y) - len(fit.free_run) :], fit.free_run),
+    )
 
 
 def evidence(sticky: Model, rivals: list[Model], valve: int, span: float) -> dict[str, float]:

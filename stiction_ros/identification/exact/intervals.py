@@ -14,7 +14,7 @@ from stiction_ros.identification.exact.pattern_search import (
     nearby_delays,
     points_of,
 )
-from stiction_ros.identification.friction.grid import coarse_grid
+from stiction_ros.identification.friction import coarse_grid
 from stiction_ros.identification.problem.models import (
     Data,
     Model,
@@ -23,7 +23,7 @@ from stiction_ros.identification.problem.models import (
     with_valve,
 )
 from stiction_ros.identification.problem.output_error import Orders
-from stiction_ros.identification.switching.scan import PatternScan
+from stiction_ros.identification.switching import PatternScan
 
 # f_S, f_D and one more for the choice among very many patterns.
 FREEDOM = 3

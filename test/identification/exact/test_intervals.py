@@ -5,7 +5,7 @@ import pytest
 import simulated_loops as loops
 
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.identification.inference.intervals import (
+from stiction_ros.identification.exact.intervals import (
     FrictionIntervals,
     Interval,
     friction_intervals,

@@ -17,16 +17,143 @@ starts either at a given level, and then slips as (4) says, or its first slip is
 """
 
 import dataclasses
+import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from stiction_ros.effects import FrictionLaw, HeStiction
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.effects.friction.moving_rules import MovingRules
 from stiction_ros.errors import InputError
-from stiction_ros.identification.friction.further import first_values
-from stiction_ros.identification.kernels.step import he_pattern_steps
-from stiction_ros.identification.switching.step_signals import StepSignals
+from stiction_ros.identification.friction import first_values, simulate
+from stiction_ros.identification.kernels.step import dense_steps, he_pattern_steps, he_steps
+
+
+@dataclasses.dataclass(frozen=True)
+class StepSignals:
+    """G signals of c channels each that are constant between few samples, as stems are.
+
+    A valve is kept as the samples at which it changes and the values from there on. What costs time
+    then grows with the moves, not with the samples.
+    """
+
+    count: int  # N, samples of every signal
+    # rows ``offsets[g]`` to ``offsets[g + 1]`` belong to signal g, shape (G + 1,)
+    offsets: IntArray
+    # samples from which on a row holds; 0 in the first of every signal, shape (R,)
+    places: IntArray
+    values: FloatArray  # shape (R, c)
+
+    @classmethod
+    def of(cls, *channels: FloatArray) -> "StepSignals":
+        """Return the signals of which ``channels``, shape (N, G) each, hold all samples."""
+        count = len(channels[0])
+        rows = np.ascontiguousarray(np.stack(channels).transpose(2, 0, 1), dtype=float)
+        return cls(count, *dense_steps(rows))
+
+    @classmethod
+    def joined(cls, parts: "list[StepSignals]") -> "StepSignals":
+        """Return all signals of several lists, at least one, of equal N and c."""
+        offsets, total = [np.zeros(1, dtype=np.int64)], 0
+        for part in parts:
+            offsets.append(part.offsets[1:] + total)
+            total += len(part.places)
+        return cls(
+            parts[0].count,
+            np.concatenate(offsets),
+            np.concatenate([part.places for part in parts]),
+            np.concatenate([part.values for part in parts]),
+        )
+
+    def part(self, begin: int, end: int) -> "StepSignals":
+        """Return the signals from ``begin`` to before ``end``."""
+        rows = slice(self.offsets[begin], self.offsets[end])
+        offsets = self.offsets[begin : end + 1] - self.offsets[begin]
+        return StepSignals(self.count, offsets, self.places[rows], self.values[rows])
+
+    def chosen(self, signals: IntArray) -> "StepSignals":
+        """Return some of the signals, by their indices."""
+        lengths = np.diff(self.offsets)[signals]
+        offsets = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(lengths)])
+        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[signals] - offsets[:-1], lengths)
+        return StepSignals(self.count, offsets, self.places[rows], self.values[rows])
+
+    @property
+    def size(self) -> int:
+        """G, number of signals."""
+        return len(self.offsets) - 1
+
+    @property
+    def moves(self) -> IntArray:
+        """How often the first channel of each signal changes, shape (G,)."""
+        if self.values.shape[1] == 1:  # every row but the first is a change
+            return np.diff(self.offsets) - 1
+        changed = np.zeros(len(self.places) + 1, dtype=np.int64)
+        changed[1:-1] = self.values[1:, 0] != self.values[:-1, 0]
+        changed[self.offsets] = 0
+        return np.diff(np.cumsum(changed)[self.offsets])
+
+
+def stem_steps(
+    law: type[FrictionLaw],
+    grid: FloatArray,
+    u: FloatArray,
+    start: FloatArray | float,
+    further: Sequence[float] = (),
+) -> StepSignals:
+    """Return stems for rows (f_S, f_D) and OP u, shape (N,), as :func:`simulate` does."""
+    if law is not HeStiction:
+        return StepSignals.of(simulate(law, grid, u, start, further))
+    starts = np.broadcast_to(np.asarray(start, dtype=float), (len(grid),)).copy()
+    static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
+    return StepSignals(len(u), *he_steps(static, dynamic, u, starts))
+
+
+@dataclasses.dataclass(frozen=True)
+class PatternScan:
+    """Evaluated cells."""
+
+    bounds: FloatArray  # rows (J low, J high, S low, S high), %, shape (G, 4)
+    dynamic: FloatArray  # range of f_D in the cell, shape (G, 2)
+    level: FloatArray  # best f_D in the cell, shape (G,)
+    curvature: FloatArray  # second derivative of the loss in f_D, shape (G,)
+    loss: FloatArray  # n log(SE / n) at the best f_D and delays, summed over outputs, shape (G,)
+    delays: FloatArray  # best delay per output, shape (G, p)
+    moves: FloatArray  # number of stem moves, shape (G,)
+
+    @staticmethod
+    def joined(parts: "list[PatternScan]") -> "PatternScan":
+        """Return all cells of several scans."""
+        names = [field.name for field in dataclasses.fields(PatternScan)]
+        return PatternScan(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+
+    def chosen(self, cells: IntArray) -> "PatternScan":
+        """Return some of the cells, by their indices."""
+        names = [field.name for field in dataclasses.fields(PatternScan)]
+        return PatternScan(*(getattr(self, name)[cells] for name in names))
+
+    def static_range(self, index: int, dynamic: tuple[float, float]) -> tuple[float, float]:
+        """Return the values of f_S in a cell for f_D in a range, %."""
+        jl, jh, sl, sh = self.bounds[index].tolist()
+        least, most = dynamic
+        low = min(max(0.5 * (sl - jl), least), most)
+        high = min(max(0.5 * (sh - jh), least), most) if math.isfinite(jh) else most
+        return max(jl + low, sl - low, low), min(jh + high, sh - high)
+
+    def middle(self, index: int, limit: float) -> tuple[float, float]:
+        """Return f_S in the middle of a cell at its best f_D, and that f_D, %."""
+        f_d = float(self.level[index])
+        low, high = self.static_range(index, (f_d, f_d))
+        return 0.5 * (low + min(high, limit)), f_d
+
+    def accepted_dynamic(self, index: int, allowance: float) -> tuple[float, float]:
+        """Return the values of f_D in a cell whose loss exceeds its best by ``allowance``."""
+        curvature = max(float(self.curvature[index]), 1e-300)
+        reach = float(np.sqrt(2.0 * max(allowance, 0.0) / curvature))
+        low, high = self.dynamic[index]
+        level = self.level[index]
+        return float(max(low, level - reach)), float(min(high, level + reach))
 
 
 @dataclasses.dataclass(frozen=True)

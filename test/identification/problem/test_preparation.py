@@ -7,9 +7,8 @@ import pytest
 import simulated_loops as loops
 
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
-from stiction_ros.identification.exact import long_records
-from stiction_ros.identification.exact.long_records import liveliest_part
-from stiction_ros.identification.problem.preparation import prepare
+from stiction_ros.identification.problem import preparation
+from stiction_ros.identification.problem.preparation import liveliest_part, prepare
 
 
 def test_short_record_is_taken_whole() -> None:
@@ -18,7 +17,7 @@ def test_short_record_is_taken_whole() -> None:
 
 
 def test_part_is_where_op_moves_most(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(long_records, "PART", 300)
+    monkeypatch.setattr(preparation, "PART", 300)
     record = loops.example1(0, samples=1200)
     quiet = record.op.copy()
     quiet[:, 0] *= np.where(np.arange(1200) < 800, 0.01, 1.0)
@@ -32,7 +31,7 @@ def test_part_is_where_op_moves_most(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.trial
 def test_conclusion_uses_all_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(long_records, "PART", 1300)
+    monkeypatch.setattr(preparation, "PART", 1300)
     options = IdentificationOptions(output_order=3, input_order=3)
     record = loops.example1(1, "equation")
     found = identify(record, options)

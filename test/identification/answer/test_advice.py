@@ -1,23 +1,25 @@
-"""What an undecided answer says would decide."""
+"""What an undecided answer says would decide, and what is known of a kind of loop."""
 
 import dataclasses
 import re
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions, VerdictKind
-from stiction_ros.identification.answer import experiment as module
-from stiction_ros.identification.answer.advice import advised
-from stiction_ros.identification.answer.experiment import experiment_for
-from stiction_ros.identification.answer.step_answer import StepAnswer
-from stiction_ros.identification.judgement.figures import Figures, definitions
-from stiction_ros.identification.result.identification import (
-    FitStatus,
-    Identification,
-    OutputModel,
-    ValveEstimate,
+from stiction_ros.identification.answer import advice as module
+from stiction_ros.identification.answer.advice import (
+    EXPECTED,
+    advised,
+    experiment_for,
+    sentence_by_kind,
 )
+from stiction_ros.identification.answer.step_answer import StepAnswer
+from stiction_ros.identification.judgement import Figures, definitions
+from stiction_ros.identification.result import FitStatus, Identification, OutputModel, ValveEstimate
 from stiction_ros.records.record import Record
 
 
@@ -138,3 +140,46 @@ def test_an_op_that_was_centred_has_its_mean_at_nothing() -> None:
     op = np.array([-1.0, 1.0, -1.0, 1.0]) + 4.05e-9
     assert module._middle(op) == 0.0
     assert module._middle(op + 40.0) == pytest.approx(40.0)
+
+
+FAST = StepAnswer("PV1", 1.0, 4.0, np.ones(9), 0.1, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "lag", "agrees"),
+    [
+        ("flow", 4.0, True),
+        ("flow", 300.0, False),
+        ("flow", None, False),
+        ("pressure", 1.0, True),
+        ("pressure", None, True),
+        ("level", None, True),
+        ("level", 2.0, False),
+        ("temperature", 120.0, True),
+        ("temperature", 1.0, False),
+        ("temperature", 30_000.0, False),
+        ("analyser", 900.0, True),
+        ("analyser", 3.0, False),
+    ],
+)
+def test_a_kind_speaks_for_or_against_a_process(kind: str, lag: float | None, agrees: bool) -> None:
+    sentence = sentence_by_kind(kind, dataclasses.replace(FAST, lag=lag))
+    assert sentence.endswith(f"as a {kind} may") is agrees
+    assert (f"no {kind} does" in sentence) is not agrees
+
+
+def test_slow_sampling_contradicts_nothing() -> None:
+    slow = dataclasses.replace(FAST, dead_time=0.0, lag=0.0, sample_time=10.0)
+    assert "do not tell" in sentence_by_kind("temperature", slow)
+
+
+@given(st.sampled_from(list(EXPECTED)), st.floats(0.0, 1e6))
+def test_one_stretch_of_lags_is_plausible(kind: str, lag: float) -> None:
+    answer = dataclasses.replace(FAST, dead_time=0.0, lag=lag)
+    inside = EXPECTED[kind].fastest <= lag <= EXPECTED[kind].slowest
+    assert sentence_by_kind(kind, answer).endswith("may") is inside
+
+
+def test_an_unknown_kind_is_refused() -> None:
+    with pytest.raises(InputError, match="unknown kind"):
+        IdentificationOptions(kind="speed")
