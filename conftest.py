@@ -21,6 +21,8 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 # As the command and the nodes do; fits run on one thread.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Frozen figures follow the last digits of linear algebra, which differ between kinds of processors.
+os.environ.setdefault("OPENBLAS_CORETYPE", "Haswell")
 # Wheels set no prefix path; a sourced ROS installation does.
 if (Path(sys.prefix) / "share" / "ament_index").is_dir():
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)

@@ -16,9 +16,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-# One thread for linear algebra, as the command and the nodes have: answers must not depend on it.
+# One thread for linear algebra, as the command and the nodes have, and the same code for every
+# processor that has AVX2: its last digits decide which of two optima that are alike is found.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_CORETYPE", "Haswell")
 
 from stiction_ros.errors import InputError
 from stiction_studies.seeds import add_jobs, run_each
