@@ -97,9 +97,8 @@ def by_folds(rows: Sequence[Judged], without: str | None = None) -> FloatArray:
     for k in range(FOLDS):
         rest = [row for row, its in zip(rows, fold, strict=True) if its != k]
         model = fitted(rest, without)
-        told[fold == k] = probabilities(
-            model, [rows[i] for i in np.flatnonzero(fold == k).tolist()]
-        )
+        left_out = [row for row, its in zip(rows, fold, strict=True) if its == k]
+        told[fold == k] = probabilities(model, left_out)
     return told
 
 
