@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.control import ControlMode, FrictionSpread, MpcController
+from stiction_ros.control.belief import jump_form
 from stiction_ros.control.design import ControlDesign, History
-from stiction_ros.control.jump_form import jump_form
 from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.gain.draws import Draws

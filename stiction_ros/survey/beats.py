@@ -3,8 +3,7 @@
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.signals.movement import moving, size
-from stiction_ros.signals.oscillation import turnings
+from stiction_ros.signals.oscillation import moving, size, turnings
 
 MOST = 200  # beats that are kept of a record, the last ones
 FEWEST = 5  # beats of one loop from which two can be compared

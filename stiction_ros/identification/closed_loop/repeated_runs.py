@@ -12,8 +12,7 @@ from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free
 from stiction_ros.identification.friction import find_law
 from stiction_ros.identification.result import ValveEstimate
 from stiction_ros.loop.linear_loops import Controllers, Pairs, Process, Runs, run_loops
-from stiction_ros.signals.movement import moving, size
-from stiction_ros.signals.oscillation import REGULAR, oscillation
+from stiction_ros.signals.oscillation import REGULAR, moving, oscillation, size
 from stiction_ros.signals.spectral_lines import fitted_lines
 
 MOST = 6000

@@ -2,8 +2,7 @@ import numpy as np
 
 from stiction_ros.control import ControlMode, MpcController
 from stiction_ros.control_settings import ControlSettings
-from stiction_ros.gain.retuning import frequencies
-from stiction_ros.gain.swiftness import predictive_response
+from stiction_ros.gain.retuning import frequencies, predictive_response
 from stiction_ros.loop import LoopModel
 
 MODEL = {
