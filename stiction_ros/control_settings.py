@@ -15,7 +15,7 @@ from stiction_ros.control.strategies import FallbackRule
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.paper.controllers.inversion import as_printed
+from stiction_ros.paper.controllers.embedding import as_printed
 from stiction_ros.paper.controllers.weights import (
     PaperTuning,
     ProgrammeCost,

@@ -35,9 +35,14 @@ from stiction_ros.effects.friction.he import HeStiction
 from stiction_ros.effects.friction.he_smoothed import SmoothedHeStiction
 from stiction_ros.effects.friction.kano import KanoStiction
 from stiction_ros.effects.friction.kano_smoothed import SmoothedKanoStiction
-from stiction_ros.effects.friction.parameters import FrictionLaw, FrictionPair, SlipJumpPair
 from stiction_ros.effects.friction.semi_physical import SemiPhysicalStiction
-from stiction_ros.effects.friction.stiction import JumpForm, Stiction
+from stiction_ros.effects.friction.stiction import (
+    FrictionLaw,
+    FrictionPair,
+    JumpForm,
+    SlipJumpPair,
+    Stiction,
+)
 from stiction_ros.effects.friction.xch import XchStiction
 from stiction_ros.effects.process.delay import ExtraDelay
 from stiction_ros.effects.process.gain import ProcessGain

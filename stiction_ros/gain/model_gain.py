@@ -7,7 +7,7 @@ import numpy as np
 
 from stiction_ros.control import MpcController
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.effects.friction.parameters import FrictionPair, SlipJumpPair
+from stiction_ros.effects.friction.stiction import FrictionPair, SlipJumpPair
 from stiction_ros.errors import InputError
 from stiction_ros.gain.embedding import EmbeddingDesign
 from stiction_ros.gain.gain import Gain, Option, What, option_of

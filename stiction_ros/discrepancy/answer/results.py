@@ -95,19 +95,12 @@ def _reason(kind: type[Behaviour], candidates: Sequence[Candidate]) -> str:
     if kind.absorbed and not any(c.absorbed for c in candidates):
         return ABSORBED
     said = kind.not_searched
-    plain = said == Behaviour.not_searched
-    return NO_ROOM if plain and _has_candidate(kind) else said
-
-
-def _of_ones_own(kind: type[Behaviour]) -> bool:
-    shipped = kind.__module__.startswith("stiction_ros.effects.")
-    return not shipped or kind.__module__.startswith("stiction_ros.effects.own.")
-
-
-def _has_candidate(kind: type[Behaviour]) -> bool:
-    """Tell whether there is a candidate for it where the records call for one."""
+    if said != Behaviour.not_searched:
+        return said
     names_axes = kind.axes.__func__ is not Behaviour.axes.__func__  # type: ignore[attr-defined]
-    return names_axes or not _of_ones_own(kind)
+    home = kind.__module__
+    shipped = home.startswith("stiction_ros.effects.") and ".effects.own." not in home
+    return NO_ROOM if names_axes or shipped else said
 
 
 @dataclasses.dataclass(frozen=True)

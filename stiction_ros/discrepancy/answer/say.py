@@ -66,7 +66,7 @@ def _of_looks(
             return GapVerdict.UNKNOWN, ()
         if last.chosen is not None and not looks[-1].kept:
             return GapVerdict.NONE, ()
-        if not any(t.testable for t in testable if _physical(t)):
+        if not any(t.testable for t in testable if t.place.startswith(("valve:", "process:"))):
             return GapVerdict.UNTESTABLE, ()
         return GapVerdict.NONE, ()
     if last.verdict is GapVerdict.UNKNOWN and _much_left(effects, looks[-1]):
@@ -137,10 +137,6 @@ def called(place: str, effect: str, law: str | None = None) -> str:
         "sensor": f"{effect} of the sensor of {tag}",
     }
     return words.get(kind, effect)
-
-
-def _physical(entry: Testable) -> bool:
-    return entry.place.startswith(("valve:", "process:"))
 
 
 def _much_left(effects: Sequence[FoundEffect], look: Look) -> bool:

@@ -155,11 +155,7 @@ def plugged_candidates(run: FreeRun, whitened: list[FloatArray]) -> list[Candida
             places = [place for place in ON_OUTPUTS if place in kind.places]
             moments = surprises(run, [whitened[i]])
             found += [PluggedOutput.of(run, i, place, kind, moments) for place in places]
-    return [candidate for candidate in found if candidate.axes and _has_a_point(candidate)]
-
-
-def _has_a_point(candidate: Candidate) -> bool:
-    return bool(candidate.possible(candidate.values(candidate.grid())).any())
+    return [c for c in found if c.axes and c.possible(c.values(c.grid())).any()]
 
 
 def possible(kind: type[Behaviour], points: FloatArray) -> BoolArray:

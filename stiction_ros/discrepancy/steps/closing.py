@@ -2,7 +2,6 @@
 
 import math
 import time
-from collections.abc import Callable
 
 import numpy as np
 
@@ -27,7 +26,6 @@ from stiction_ros.discrepancy.answer.say import (
 )
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.decision.decide import SURE, GapVerdict, on_the_way, verdict_of
-from stiction_ros.discrepancy.decision.extend import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.fit.uncertainty import (
@@ -83,8 +81,10 @@ def closing(task: Task, looked: State) -> Discrepancy:
     no_names = [
         called(*e.fit.candidate.key) for e in looked.added if e.fit.candidate.key not in kept
     ]
-    if verdict is GapVerdict.UNKNOWN and state.changes and _mended(state):
-        verdict = effects[0].verdict if effects else GapVerdict.NONE
+    if verdict is GapVerdict.UNKNOWN and state.changes:
+        gained = state.before.bic - state.base.bic + state.base.held_gain(state.before)
+        if max(fit.evidence for fit in state.looks[-1].scores.fits) < LEFT * gained:
+            verdict = effects[0].verdict if effects else GapVerdict.NONE
     silent = not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE)
     if silent and (no_names or _taken_back(task, state) or _noise_left(task, state, noises)):
         verdict = GapVerdict.UNKNOWN
@@ -177,61 +177,53 @@ def _found(task: Task, state: State) -> list[FoundEffect]:
     for k, effect in enumerate(state.added):
         others = [*moved[:k], *moved[k + 1 :], *slopes]
         beside = [np.hstack(columns) for columns in zip(*others, strict=True)]
-        found.append(_effect(task, state, k, effect, without[k], beside))
+        told = FoundEffect(
+            effect.place,
+            effect.effect,
+            effect.behaviour.law,
+            figures_of(effect.behaviour),
+            units_of(effect.behaviour, effect.place),
+            _intervals(task, state, k, without[k], beside),
+            effect.fit.delta_bic,
+            own_closed(
+                without[k],
+                state.base,
+                dated=effect.fit.candidate.dated,
+                given=not task.options.process_fitted,
+            ),
+            verdict_of(effect.effect, effect.alternatives),
+            effect.alternatives,
+            reason_for(effect, state.looks),
+            moved_by(without[k], state.base),
+        )
+        found.append(told)
     return found
 
 
-def _effect(
-    task: Task,
-    state: State,
-    k: int,
-    effect: AddedEffect,
-    without: Baseline,
-    beside: list[FloatArray],
-) -> FoundEffect:
-    """Return what is told of the k-th effect, ``without`` which is the model with all others.
-
-    ``beside`` is per output what all others, and what of the process was changed, would do by other
-    figures, shape (N, q).
-    """
-    return FoundEffect(
-        effect.place,
-        effect.effect,
-        effect.behaviour.law,
-        figures_of(effect.behaviour),
-        units_of(effect.behaviour, effect.place),
-        _intervals(task, state, k, effect, without, beside),
-        effect.fit.delta_bic,
-        own_closed(
-            without,
-            state.base,
-            dated=effect.fit.candidate.dated,
-            given=not task.options.process_fitted,
-        ),
-        verdict_of(effect.effect, effect.alternatives),
-        effect.alternatives,
-        reason_for(effect, state.looks),
-        moved_by(without, state.base),
-    )
-
-
 def _intervals(
-    task: Task, state: State, k: int, effect: AddedEffect, base: Baseline, beside: list[FloatArray]
+    task: Task, state: State, k: int, base: Baseline, beside: list[FloatArray]
 ) -> Intervals:
+    """Return those of the k-th effect.
+
+    Args:
+        task, state, k: whose.
+        base: of the model with all other effects.
+        beside: per output what these, and what of the process was changed, would do by other
+            figures, shape (N, q).
+    """
+    effect = state.added[k]
     if task.options.quick:
-        found = likelihood_intervals(base, effect.fit, beside)
-    else:
-        share = _share(task, state, k)
-        found = bootstrap_intervals(
-            base, effect.fit, task.options.resamples, task.random, share, beside
-        )
-    return without_its_jump(found, effect)
-
-
-def _share(task: Task, state: State, k: int) -> Callable[[float], None]:
+        return without_its_jump(likelihood_intervals(base, effect.fit, beside), effect)
     done = task.options.most_effects / (task.options.most_effects + 1)
     part = (1.0 - done) / len(state.added)
-    return lambda share: task.report(done + (k + share) * part)
+
+    def report(share: float) -> None:
+        task.report(done + (k + share) * part)
+
+    found = bootstrap_intervals(
+        base, effect.fit, task.options.resamples, task.random, report, beside
+    )
+    return without_its_jump(found, effect)
 
 
 def _explained_by_no_name(task: Task, looked: State, state: State) -> bool:
@@ -280,12 +272,6 @@ def _stranger(state: State, law: NoiseEffect) -> float:
     if last.decision.chosen is not None and not last.kept:
         return last.decision.chosen.evidence
     return -NO_LAW
-
-
-def _mended(state: State) -> bool:
-    """Tell whether the changed process took most of what was left without a name."""
-    gained = state.before.bic - state.base.bic + state.base.held_gain(state.before)
-    return max(fit.evidence for fit in state.looks[-1].scores.fits) < LEFT * gained
 
 
 def _noise_left(task: Task, state: State, noises: tuple[OutputNoise, ...]) -> bool:

@@ -91,7 +91,11 @@ def look(task: Task, state: State, k: int) -> State:
     seen = dataclasses.replace(
         room if kept else state, testable=testable, looks=(*state.looks, own), doubted=doubted
     )
-    return changed_again(task, _grown(seen, bare, step)) if step and kept else seen
+    if not (step and kept):
+        return seen
+    earlier = (*seen.earlier, seen.bare)
+    grown = dataclasses.replace(seen, bare=bare, base=step.base, added=step.added, earlier=earlier)
+    return changed_again(task, grown)
 
 
 def explained(state: State) -> bool:
@@ -202,12 +206,6 @@ def _extended(
         effects = refit_together(bare, task.runs, effects)
     *others, new = effects
     return room, bare, extend(bare, task.runs, others, new, state.base, lent=lent)
-
-
-def _grown(state: State, bare: LoopModel, step: Extension) -> State:
-    """Return the state with the effects of an extension, and the model behind them."""
-    earlier = (*state.earlier, state.bare)
-    return dataclasses.replace(state, bare=bare, base=step.base, added=step.added, earlier=earlier)
 
 
 def _in_doubt_of_place(base: Baseline, decision: Decision) -> Decision:

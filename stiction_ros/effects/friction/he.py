@@ -6,8 +6,13 @@ from typing import ClassVar
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, Memory, Start
-from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
-from stiction_ros.effects.friction.stiction import SLIPS, JumpForm, Switching
+from stiction_ros.effects.friction.stiction import (
+    NOT_SEARCHED,
+    SLIPS,
+    FrictionPair,
+    JumpForm,
+    Switching,
+)
 
 
 @dataclasses.dataclass(frozen=True)

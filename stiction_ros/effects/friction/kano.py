@@ -7,8 +7,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, Memory, Start, starts
 from stiction_ros.effects.friction.moving_rules import FollowingRules
-from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
-from stiction_ros.effects.friction.stiction import JumpForm, Switching
+from stiction_ros.effects.friction.stiction import NOT_SEARCHED, JumpForm, SlipJumpPair, Switching
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,7 +5,7 @@ import math
 from typing import Any, ClassVar
 
 from stiction_ros.effects.behaviour import Memory, parameter
-from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
+from stiction_ros.effects.friction.stiction import NOT_SEARCHED, SlipJumpPair
 
 REST = 10.0  # OP that moves by less than REST / τ in a sample rests
 

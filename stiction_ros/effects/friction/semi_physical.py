@@ -6,8 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, Memory, Start, parameter
-from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
-from stiction_ros.effects.friction.stiction import JumpForm
+from stiction_ros.effects.friction.stiction import NOT_SEARCHED, FrictionPair, JumpForm
 
 
 @dataclasses.dataclass(frozen=True)

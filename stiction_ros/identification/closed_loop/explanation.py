@@ -127,17 +127,17 @@ def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> 
         and estimate.static_friction > 0.0
         and output.rivalry < RIVAL
     ]
-    kind, sentence = _kind(output, closed, [one for one in there if _is_cause(*one)])
+    acting = [
+        (valve, loop)
+        for valve, loop in there
+        if valve.is_likely and (_gone(loop) > MATERIAL or _open_and_sure(valve, loop))
+    ]
+    kind, sentence = _kind(output, closed, acting)
     if kind is CauseKind.UNKNOWN:
         kind, sentence = _left_over(sentence, there)
     driver = output.set_point if kind is CauseKind.SET_POINT else None
     period = (driver or swing).period * record.sample_time
     return Cause(kind, period, swing.regularity, swing.amplitude, sentence)
-
-
-def _is_cause(valve: ValveEstimate, loop: ValveLoop) -> bool:
-    """Tell whether the friction of a valve makes its loop move."""
-    return valve.is_likely and (_gone(loop) > MATERIAL or _open_and_sure(valve, loop))
 
 
 def _gone(loop: ValveLoop) -> float:

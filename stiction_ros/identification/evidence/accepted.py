@@ -62,7 +62,7 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
         confidence: level of the intervals.
     """
     gain = found.without[valve].loss - found.best.loss
-    slack = _slack(gain, confidence)
+    slack = chi2_quantile(confidence, FREEDOM) + MISFIT * max(gain, 0.0)
     judge = Judge.of(problem, found.best, valve, found.best.fits, held=True)
     tried, lost = _looked_at(judge, found)
     beyond = _beyond(tried[lost <= lost.min() + slack])
@@ -83,10 +83,6 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
         material_gain=found.without[valve].loss - material,
         profile=_profile(rows[:, 0], lost),
     )
-
-
-def _slack(gain: float, confidence: float) -> float:
-    return chi2_quantile(confidence, FREEDOM) + MISFIT * max(gain, 0.0)
 
 
 def _looked_at(judge: Judge, found: Found) -> tuple[FloatArray, FloatArray]:

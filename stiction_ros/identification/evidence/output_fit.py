@@ -148,7 +148,8 @@ def _stepped(
     first = _with_noise(problem, output, whole, fit, whole.noise_step(fit.prior, fit.rest))
     if first[1].loss < fit.loss + SETTLED:
         return first
-    second = _with_noise(problem, output, whole, fit, _noise_beside(problem, fit))
+    noise = noise_of(fit.rest[problem.first - NOISE_ORDER :], NOISE_ORDER)
+    second = _with_noise(problem, output, whole, fit, noise)
     return min(first, second, key=lambda pair: pair[1].loss)
 
 
@@ -192,7 +193,3 @@ def _fitted(problem: Problem, output: int, whole: Whitened, prior: ResponsePrior
         rest -= np.concatenate([-sizes.imag, sizes.real]) @ problem.waves[output]
     rest -= rest[problem.first :].mean()
     return OutputFit(whole.noise, prior, loss, responses, rest)
-
-
-def _noise_beside(problem: Problem, fit: OutputFit) -> FloatArray:
-    return noise_of(fit.rest[problem.first - NOISE_ORDER :], NOISE_ORDER)

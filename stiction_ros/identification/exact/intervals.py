@@ -3,10 +3,8 @@
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction_ros.deferred import chi2_quantile
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.exact.neighbourhood import refine
 from stiction_ros.identification.exact.pattern_search import (
     PatternSearch,
@@ -66,10 +64,12 @@ def friction_intervals(
     scan = PatternScan.joined([point_patterns(zero), scan])
     scan = _without_standstill(data, model, orders, valve, scan, threshold)
     floor = float(scan.loss.min())
-    accepted = np.flatnonzero(scan.loss <= floor + threshold)
-    parts = [_accepted_ranges(scan, int(i), floor + threshold, limit) for i in accepted]
-    static = _hull([part[0] for part in parts])
-    dynamic = _hull([part[1] for part in parts])
+    accepted = np.flatnonzero(scan.loss <= floor + threshold).tolist()
+    dynamics = [scan.accepted_dynamic(i, floor + threshold - float(scan.loss[i])) for i in accepted]
+    statics = [scan.static_range(i, each) for i, each in zip(accepted, dynamics, strict=True)]
+    lows, highs = zip(*statics, strict=True)
+    static = min(float(min(lows)), limit), min(float(max(highs)), limit)
+    dynamic = min(low for low, _ in dynamics), max(high for _, high in dynamics)
     estimate = _estimate(scan, accepted, static, limit)
     return FrictionIntervals(
         static=static,
@@ -90,12 +90,8 @@ def _far_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Patte
     search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve, 0))
     coarse = search.scan(coarse_grid(limit), start)
     chosen = coarse.grid[np.argsort(coarse.loss, kind="stable")[:FAR]]
-    return best_in_cells(search, np.vstack([chosen, _deadbands(limit)]), start)[1]
-
-
-def _deadbands(limit: float) -> FloatArray:
-    values = limit * (np.arange(1, 41) / 40.0) ** 2
-    return np.column_stack([values, values])
+    deadbands = np.repeat(limit * (np.arange(1, 41) / 40.0) ** 2, 2).reshape(-1, 2)
+    return best_in_cells(search, np.vstack([chosen, deadbands]), start)[1]
 
 
 def _without_standstill(
@@ -129,19 +125,6 @@ def _without_standstill(
     return dataclasses.replace(scan, loss=loss)
 
 
-def _accepted_ranges(
-    scan: PatternScan, index: int, highest: float, limit: float
-) -> tuple[Interval, Interval]:
-    """Return the f_S and the f_D of one pattern whose loss stays below ``highest``."""
-    dynamic = scan.accepted_dynamic(index, highest - float(scan.loss[index]))
-    low, high = scan.static_range(index, dynamic)
-    return (float(min(low, limit)), float(min(high, limit))), dynamic
-
-
-def _hull(intervals: list[Interval]) -> Interval:
-    return min(low for low, _ in intervals), max(high for _, high in intervals)
-
-
 def _profile(scan: PatternScan, floor: float, limit: float) -> tuple[tuple[float, float], ...]:
     """Return the lower envelope of the loss over f_S, finest where it is lowest."""
     static = np.array([scan.middle(index, limit)[0] for index in range(len(scan.loss))])
@@ -159,14 +142,14 @@ def _profile(scan: PatternScan, floor: float, limit: float) -> tuple[tuple[float
 
 
 def _estimate(
-    scan: PatternScan, accepted: NDArray[np.intp], static: Interval, limit: float
+    scan: PatternScan, accepted: list[int], static: Interval, limit: float
 ) -> tuple[float, float]:
     """Return f_S in the middle of its interval where a pattern there is accepted, and f_D."""
     middle = 0.5 * (static[0] + static[1])
     f_s, f_d = scan.middle(int(scan.loss.argmin()), limit)
     for index in accepted:
         level = float(scan.level[index])
-        low, high = scan.static_range(int(index), (level, level))
+        low, high = scan.static_range(index, (level, level))
         if low <= middle <= high:
             return float(max(middle, f_d)), f_d
     return float(f_s), f_d

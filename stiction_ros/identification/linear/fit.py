@@ -173,19 +173,14 @@ def _state_space(data: LinearData, options: LinearOptions) -> StateSpaceFit:
         ]
         # A delay belongs to the valve, so the output that answers first decides.
         tried.append(tuple(int(d) for d in np.min(rows, axis=0)))
-    fits = [_on_one_window(data, wanted, delay, max(map(max, tried))) for delay in tried]
-    return min(fits, key=lambda fit: (fit.status is not LinearStatus.OK, _criterion(fit, wanted)))
+    fits, longest = [], max(map(max, tried))
+    for delay in tried:  # on one window
+        late = longest - max(delay)
+        part = dataclasses.replace(data, u=data.u[:, late:], y=data.y[:, late:])
+        fits.append(fit_state_space(part, dataclasses.replace(wanted, delay=delay)))
 
+    def rank(fit: StateSpaceFit) -> tuple[bool, float]:
+        values = [row.value(options.criterion) for row in fit.rivals if row.order == fit.order]
+        return fit.status is not LinearStatus.OK, min(values, default=float("inf"))
 
-def _on_one_window(
-    data: LinearData, options: SubspaceOptions, delay: tuple[int, ...], longest: int
-) -> StateSpaceFit:
-    """Return the fit with these delays on the outputs from sample ``longest`` on."""
-    late = longest - max(delay)
-    part = dataclasses.replace(data, u=data.u[:, late:], y=data.y[:, late:])
-    return fit_state_space(part, dataclasses.replace(options, delay=delay))
-
-
-def _criterion(fit: StateSpaceFit, options: SubspaceOptions) -> float:
-    rows = [row for row in fit.rivals if row.order == fit.order]
-    return rows[0].value(options.criterion) if rows else float("inf")
+    return min(fits, key=rank)

@@ -7,8 +7,11 @@ import daqp
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.paper.controllers.augmented_cost import AugmentedCost, PlanProblem
-from stiction_ros.paper.controllers.laws import PrintedFriction
+from stiction_ros.paper.controllers.augmented_cost import (
+    AugmentedCost,
+    PlanProblem,
+    PrintedFriction,
+)
 
 LEAST_SLIP = 1e-3  # %; by (4) an error of exactly f_S does not slip
 FREE = 1e30

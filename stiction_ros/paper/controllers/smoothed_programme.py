@@ -8,8 +8,12 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.paper.controllers.augmented_cost import PlanProblem
-from stiction_ros.paper.controllers.laws import PrintedFriction, directed, smoothed_stem
+from stiction_ros.paper.controllers.augmented_cost import (
+    PlanProblem,
+    PrintedFriction,
+    directed,
+    smoothed_stem,
+)
 from stiction_ros.paper.controllers.weights import PaperTuning
 from stiction_ros.processes import LinearModel
 
@@ -129,10 +133,7 @@ class SmoothedProgramme:
             "f": cost,
             "g": casadi.vertcat(*residuals),
         }
-        return casadi.nlpsol("stiction_embedding", "ipopt", problem, self._options())
-
-    def _options(self) -> dict[str, Any]:
-        return {
+        options = {
             "ipopt.max_iter": self.tuning.iterations,
             "ipopt.print_level": 0,
             "ipopt.sb": "yes",
@@ -140,6 +141,7 @@ class SmoothedProgramme:
             "calc_lam_p": False,
             "error_on_fail": False,
         }
+        return casadi.nlpsol("stiction_embedding", "ipopt", problem, options)
 
     def solve(self, situation: PlanProblem, op: FloatArray, stems: FloatArray) -> ProgrammeResult:
         """Return the optimum that IPOPT reaches from OP and stems by the hard model, (N, m), %."""

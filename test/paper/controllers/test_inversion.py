@@ -8,7 +8,7 @@ from loops import first_order, kalman, limits_for, target_at, weights_for
 from stiction_ros.control import ControlDesign, ControlMode, MpcController
 from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.effects import HeStiction
-from stiction_ros.paper.controllers.inversion import PrintedInversionMpc, as_printed
+from stiction_ros.paper.controllers.embedding import PrintedInversionMpc, as_printed
 from stiction_ros.paper.controllers.weights import PaperTuning, WeightPreset, augmented_weights
 
 MODEL = first_order()
