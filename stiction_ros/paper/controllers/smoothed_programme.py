@@ -133,7 +133,7 @@ class SmoothedProgramme:
             "f": cost,
             "g": casadi.vertcat(*residuals),
         }
-        options = {
+        options: dict[str, Any] = {
             "ipopt.max_iter": self.tuning.iterations,
             "ipopt.print_level": 0,
             "ipopt.sb": "yes",
