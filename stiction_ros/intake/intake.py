@@ -18,7 +18,7 @@ from stiction_ros.intake.tables.plan import Plan, Shape, plan_of
 from stiction_ros.intake.tables.reading import blocks_of
 from stiction_ros.intake.tables.tags import FileWay, TagList, read_tag_list
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.bag_reader import read_bag_loops, read_bag_parts
+from stiction_ros.records.run.loop_runs import read_bag_loops, read_bag_parts
 from stiction_ros.records.storage.files import listed_names, split_number
 
 BARE = (".mcap", ".db3")  # ends of the names of files that are bags by themselves

@@ -22,11 +22,13 @@ from stiction_ros.nodes.shared.runner import run
 from stiction_ros.nodes.shared.typed import trigger
 from stiction_ros.nodes.topics.estimates import (
     figures_of,
+    finding_status,
     fit_status,
     friction_message,
+    look_status,
+    monitor_status,
     verdicts_of,
 )
-from stiction_ros.nodes.topics.gap_status import finding_status, look_status, monitor_status
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.online.health import stopped_after

@@ -10,7 +10,7 @@ from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.records.csv_writer import tagged_columns
 from stiction_ros.records.parts import only_part
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.bag_reader import read_bag_parts
+from stiction_ros.records.run.loop_runs import read_bag_parts
 
 
 def read_csv(

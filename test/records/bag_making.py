@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_typestore
 from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.parts import only_part
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.bag_reader import read_bag_parts
+from stiction_ros.records.run.loop_runs import read_bag_parts
 from stiction_ros.records.storage.bag_metadata import LATCHED, Qos
 
 STORE = get_typestore(Stores.ROS2_JAZZY)

@@ -12,8 +12,7 @@ from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 from stiction_ros.survey import assess as module
 from stiction_ros.survey.assess import Assessed, assess, at_limits
-from stiction_ros.survey.entry import Status
-from stiction_ros.survey.survey_options import SurveyOptions
+from stiction_ros.survey.entry import Status, SurveyOptions
 
 MODEL = {
     "loop": "FIC1",

@@ -16,12 +16,11 @@ from stiction_ros.online.controller.plan_points import thinned_plan
 from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.handover.approach import Approach
 from stiction_ros.online.handover.background import AtOnce, Background
-from stiction_ros.online.handover.hand_over import HandOver
+from stiction_ros.online.handover.hand_over import HandOver, Past
 from stiction_ros.online.handover.known_friction import alike, frictions_of
 from stiction_ros.online.handover.offers import Judge, last_samples
-from stiction_ros.online.handover.past import Past
 from stiction_ros.online.handover.watch import Watch
-from stiction_ros.online.input.applied_op import Given
+from stiction_ros.online.input.op_port import Given
 
 HISTORY_SAMPLES = 20_000
 FIRST_MOVE = 0.9  # %; largest move of the first OP after a start or a hold

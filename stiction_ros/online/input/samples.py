@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.loop import Instrument
-from stiction_ros.online.input.applied_op import Given
+from stiction_ros.online.input.op_port import Given
 
 
 @dataclasses.dataclass(frozen=True)

@@ -12,8 +12,7 @@ from stiction_ros.report.run import identified
 from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import Story
-from stiction_ros.report.run.summary import measured, messages
-from stiction_ros.report.run.work_table import work_rows
+from stiction_ros.report.run.summary import measured, messages, work_rows
 
 _SCORES = (
     ("amplitude", "amplitude of the cycle", ""),

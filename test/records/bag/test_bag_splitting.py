@@ -179,7 +179,7 @@ def test_a_next_file_that_finds_no_room_leaves_the_present_one_in_use(
 ) -> None:
     bag = split_bag(tmp_path / "run", Splitting(size=8000))
     files = names(tmp_path / "run")
-    monkeypatch.setattr("stiction_ros.records.storage.mcap_journal.Journal.put", refused)
+    monkeypatch.setattr("stiction_ros.records.bag.writer.Journal.put", refused)
     refusals = 0
     for k in range(200, 300):
         try:
