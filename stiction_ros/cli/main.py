@@ -149,7 +149,6 @@ class _Top(_Parser):
     """The parser of all commands, which lists them in groups."""
 
     def __init__(self, texts: Mapping[str, str]) -> None:
-        """Take what is said of each command."""
         super().__init__(prog="stiction")
         self.texts = texts
 

@@ -15,16 +15,17 @@ from stiction_ros.control import ControlMode, StepResult
 from stiction_ros.effects import from_mapping
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
+from stiction_ros.nodes.controller_inputs import ControllerInputs
+from stiction_ros.nodes.estimates import tested_message
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, diagnosis, joint_state, to_ns, trajectory
 from stiction_ros.nodes.shared.peers import publishers_of
 from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.topics.controller_inputs import ControllerInputs
-from stiction_ros.nodes.topics.estimates import tested_message
 from stiction_ros.online.controller.live import LiveController
+from stiction_ros.online.controller.making import thinned_plan
 from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.controller.testing import ValveTestingController
-from stiction_ros.online.handover.background import AtOnce, Beside
+from stiction_ros.online.handover.hand_over import AtOnce, Beside
 from stiction_ros.online.input.port import InputPort
 from stiction_ros.online.input.port_health import PortHealth, keys
 from stiction_ros.online.input.samples import PortRules, Sample
@@ -56,7 +57,7 @@ def rehearse(settings: LiveControllerSettings, model: LoopModel) -> None:
             continue
         for k in range(STEPS):
             result = live.step(model.pv0, model.pv0 + 0.01 * k)
-        live.prediction(result, 2)
+        thinned_plan(live.observed, result, 2)
         live.close()
 
 
@@ -66,7 +67,6 @@ class ControllerNode(ControllerInputs):
     settings: ControllerNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
-        """Build the node ``controller``; ``kwargs`` go to the ROS node."""
         super().__init__("controller", ControllerNodeSettings, **kwargs)
         self._late_timer: Timer | None = None
         self.listening = False
@@ -251,7 +251,7 @@ class ControllerNode(ControllerInputs):
         before, self._result = self._result, result
         if result.reason:
             self.noticed.notice("step", "warn", result.reason)
-        rows, picks = self.live.prediction(result, self.settings.prediction_points)
+        rows, picks = thinned_plan(self.live.observed, result, self.settings.prediction_points)
         times = (picks * self.model.sample_time).tolist()
         self._prediction.publish(trajectory(stamp, self._plan_names, rows, times))
         self._tell_changes()

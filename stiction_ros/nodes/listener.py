@@ -17,7 +17,7 @@ from stiction_ros.nodes.shared.peers import Inlet
 from stiction_ros.nodes.shared.typed import leave
 from stiction_ros.online.pairing import PairedSample, Pairing
 from stiction_ros.records import Record
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 
 LOOK = 0.2  # s between two looks at what has come; 5000 messages of a topic may wait
 SEARCH = 2.0  # s between two looks for loops that are new

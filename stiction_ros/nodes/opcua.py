@@ -37,7 +37,6 @@ class OpcuaNode(ManagedNode):
     settings: OpcuaNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
-        """Build the node ``opcua``; ``kwargs`` go to the ROS node."""
         super().__init__("opcua", OpcuaNodeSettings, **kwargs)
         self._link: PlantLink | None = None
         self._pacer: Timer | None = None

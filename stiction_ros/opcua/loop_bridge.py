@@ -11,8 +11,7 @@ from stiction_ros.online.health import stopped_after
 from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
 from stiction_ros.opcua.grant import Facts, GrantState, begin
 from stiction_ros.opcua.op_limits import OpLimits, RateWatch
-from stiction_ros.opcua.reading import TagQuality, TagReading
-from stiction_ros.opcua.sampling import LoopSampler, PlantSample
+from stiction_ros.opcua.sampling import LoopSampler, PlantSample, TagQuality, TagReading
 from stiction_ros.opcua.tag_map import GrantTags, LoopTags, Use
 
 PATIENCE = 3  # samples of bad quality in succession before the plant takes over
@@ -51,7 +50,6 @@ class HeardBeat:
     """Someone's beat: when it changed last."""
 
     def __init__(self) -> None:
-        """Start without a beat."""
         self._value: float | None = None
         self._changed_at: float | None = None
 

@@ -16,8 +16,7 @@ from stiction_ros.identification.valve_test.plan import first_round
 from stiction_ros.intake.loop import Loop
 from stiction_ros.records.csv_writer import DEFAULT_OUTPUT, DEFAULT_VALVE
 from stiction_ros.records.parts import longest_part
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Record
+from stiction_ros.records.record import Quality, Record
 from stiction_ros.records.valve_work import ValveWork
 from stiction_ros.signals.controller_recovery import resting_limits
 from stiction_ros.signals.oscillation import REGULAR

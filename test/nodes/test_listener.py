@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 

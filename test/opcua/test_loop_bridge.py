@@ -17,7 +17,7 @@ from stiction_ros.opcua.loop_bridge import (
     identity_of,
     mode_text,
 )
-from stiction_ros.opcua.reading import TagQuality, TagReading
+from stiction_ros.opcua.sampling import TagQuality, TagReading
 from stiction_ros.opcua.tag_map import Use, ValveTags
 
 SENDER = "/unit/controller"

@@ -9,7 +9,7 @@ from made import identification, record
 from stiction_ros.identification.result.cause import CauseKind
 from stiction_ros.identification.result.identification import FitStatus, Identification
 from stiction_ros.pages.signals import CYCLES, UNCYCLED, Window
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 
 PERIOD, SAMPLES = 60.0, 1200
 

@@ -18,8 +18,7 @@ from stiction_ros.identification.result.identification import (
     Identification,
     ValveEstimate,
 )
-from stiction_ros.loop.damping import Ringing, ringing
-from stiction_ros.loop.linear_loops import Process
+from stiction_ros.loop.linear_loops import Process, Ringing, ringing
 from stiction_ros.records.record import Record
 from stiction_ros.signals.controller_recovery import recover
 from stiction_ros.signals.holds import holds

@@ -95,7 +95,6 @@ class OpPort:
     """
 
     def __init__(self, rules: CommandRules) -> None:
-        """Start without any OP."""
         self._rules = rules
         self.commander = rules.commander
         self.counts: Counter[Reception] = Counter()

@@ -10,8 +10,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import read_messages
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Record
+from stiction_ros.records.record import Quality, Record
 from stiction_ros.records.run.bag_runs import run_of, tell_runs
 from stiction_ros.records.run.loop_signals import Given, LoopSignals, is_signal
 from stiction_ros.records.whole import Source, Whole

@@ -11,8 +11,7 @@ from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.handover.background import AtOnce, Beside
-from stiction_ros.online.handover.hand_over import HandOver, Past
+from stiction_ros.online.handover.hand_over import AtOnce, Beside, HandOver, Past
 
 PROCESS = LoopModel.load(find_config("example1_process.loop.yaml"))
 DESIGN = ControlSettings(hand_over_samples=60).design(PROCESS)

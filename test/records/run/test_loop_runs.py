@@ -16,9 +16,9 @@ from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from stiction_ros.errors import InputError
-from stiction_ros.intake.record_file import CsvColumns
+from stiction_ros.intake.intake import CsvColumns
 from stiction_ros.records.bag.messages import BagMessage, read_messages, read_raw
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 from stiction_ros.records.run.loop_runs import LoopRun, bag_source, loop_runs, read_bag_parts
 from stiction_ros.records.run.loop_signals import JOINT_STATE, LoopSignals
 
