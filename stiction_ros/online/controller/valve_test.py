@@ -15,7 +15,7 @@ from stiction_ros.identification.valve_test.plan import (
     further_round,
     stays,
 )
-from stiction_ros.online.handover.background import Background
+from stiction_ros.online.handover.hand_over import Background
 
 RESTS = 5  # holds that are waited for at most until PV rests
 

@@ -17,7 +17,7 @@ from stiction_ros.identification.valve_test.facts import LAGS
 from stiction_ros.identification.valve_test.plan import Facts
 from stiction_ros.identification.valve_test.steps import SHORTEST
 from stiction_ros.online.controller.valve_test import ValveTest
-from stiction_ros.online.handover.background import AtOnce
+from stiction_ros.online.handover.hand_over import AtOnce
 from stiction_studies.field.manual_test import ManualTest, manual_test
 from stiction_studies.field.truth import ValveKind
 from stiction_studies.seeds import run_seeds
