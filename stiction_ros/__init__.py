@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from stiction_ros.identification.methods import identify as identify
     from stiction_ros.identification.result import Identification as Identification
     from stiction_ros.identification.result import VerdictKind as VerdictKind
+    from stiction_ros.intake.intake import read as read
     from stiction_ros.intake.intake_options import CsvColumns as CsvColumns
-    from stiction_ros.intake.record_file import read as read
     from stiction_ros.loop.closed_loop import simulate as simulate
     from stiction_ros.loop.closed_loop import simulate_closed_loop as simulate_closed_loop
     from stiction_ros.loop.excitation import prbs_experiment as prbs_experiment
@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from stiction_ros.records.csv_writer import write_csv as write_csv
     from stiction_ros.records.record import Record as Record
     from stiction_ros.records.run.record_to_bag import write_bag as write_bag
-    from stiction_ros.report.record.report import report_record as report_record
+    from stiction_ros.report.record_page import report_record as report_record
 
 __version__ = "0.1.0"
 
@@ -94,8 +94,8 @@ _HOMES = {
     "identify": "identification.methods",
     "plot": "pages.signals",
     "prbs_experiment": "loop.excitation",
-    "read": "intake.record_file",
-    "report_record": "report.record.report",
+    "read": "intake.intake",
+    "report_record": "report.record_page",
     "run_live": "online.session",
     "simulate": "loop.closed_loop",
     "simulate_closed_loop": "loop.closed_loop",

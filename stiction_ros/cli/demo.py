@@ -146,7 +146,7 @@ def _print(summary: dict[str, Any], directory: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from stiction_ros.report.run.work_table import work_rows
+    from stiction_ros.report.run.summary import work_rows
 
     console = Console()
     name = summary["scenario"]

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.opcua_session import add_session, credentials_of
+from stiction_ros.cli.browse_tags import add_session, credentials_of
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError

@@ -119,7 +119,7 @@ def _record(path: str, options: argparse.Namespace) -> Record:
 
 
 def _write(found: "Discrepancy", directory: Path) -> None:
-    from stiction_ros.report.gap.report import report_gap
+    from stiction_ros.report.gap_page import report_gap
 
     with storing(directory, what="made"):
         directory.mkdir(parents=True, exist_ok=True)
@@ -128,7 +128,7 @@ def _write(found: "Discrepancy", directory: Path) -> None:
 
 
 def _print(found: "Discrepancy") -> None:
-    from stiction_ros.report.gap.words import called, plain
+    from stiction_ros.report.gap_words import called, plain
 
     console = Console()
     names = ", ".join(record.name for record in found.runs.records)

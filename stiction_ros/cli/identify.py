@@ -119,7 +119,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         intake.tell(loop)
     if options.out is not None:
-        from stiction_ros.report.record.report import report_record
+        from stiction_ros.report.record_page import report_record
 
         directory = Path(options.out)
         with storing(options.out, what="made"):

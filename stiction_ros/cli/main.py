@@ -1,11 +1,15 @@
 """The command ``stiction``."""
 
 import argparse
+import contextlib
 import importlib
 import logging
 import os
+import signal
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+import threading
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import FrameType
 from typing import Any
 
 # Two cores are shared with the nodes: linear algebra gets one thread unless told otherwise.
@@ -14,7 +18,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from stiction_ros import __version__
 from stiction_ros.cli import extensions
-from stiction_ros.cli.interrupts import waiting_for_compiler
 from stiction_ros.errors import InputError
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
@@ -52,6 +55,45 @@ GROUPS = {
     ),
 }
 """Commands by what they are for; all others are for the makers."""
+COMPILER = "llvmlite"
+"""Package whose functions are not broken off.
+
+Those that it calls back from machine code swallow what is raised in them, and keep its lock.
+"""
+
+AGAIN = 0.05  # s, until it is asked again
+
+
+@contextlib.contextmanager
+def waiting_for_compiler() -> Iterator[None]:
+    """Let Ctrl-C raise KeyboardInterrupt as soon as the main thread has left the compiler."""
+    if (
+        threading.current_thread() is not threading.main_thread()
+        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    ):
+        yield
+        return
+    signal.signal(signal.SIGINT, _interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    if not _compiles(frame):
+        raise KeyboardInterrupt
+    later = threading.Timer(AGAIN, signal.raise_signal, (number,))
+    later.daemon = True
+    later.start()
+
+
+def _compiles(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if str(frame.f_globals.get("__name__", "")).partition(".")[0] == COMPILER:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _known(command: str | None) -> Mapping[str, tuple[str, str]]:
@@ -107,7 +149,6 @@ class _Top(_Parser):
     """The parser of all commands, which lists them in groups."""
 
     def __init__(self, texts: Mapping[str, str]) -> None:
-        """Take what is said of each command."""
         super().__init__(prog="stiction")
         self.texts = texts
 

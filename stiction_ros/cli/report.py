@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
             intake.tell(loop)
             record, parts = longest_part(loop.parts), loop.parts
             from stiction_ros.identification import IdentificationOptions, identify
-            from stiction_ros.report.record.report import report_record
+            from stiction_ros.report.record_page import report_record
 
             found = identify(record, IdentificationOptions())
             print(report_record(record, found, out, parts))

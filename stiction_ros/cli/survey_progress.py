@@ -25,7 +25,6 @@ class Counted:
     """How many loops there are, counted beside the work."""
 
     def __init__(self, found: Iterable[object]) -> None:
-        """Begin to count loops, in a thread of their own."""
         self.total: int | None = None
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._count, args=(found,), daemon=True)

@@ -11,7 +11,7 @@ from stiction_ros.discrepancy.steps.begin import begin
 from stiction_ros.discrepancy.steps.closing import closing
 from stiction_ros.discrepancy.steps.look import look_on
 from stiction_ros.discrepancy.steps.settle import settle
-from stiction_ros.intake.record_file import record_of
+from stiction_ros.intake.intake import record_of
 from stiction_ros.loop import LoopModel
 from stiction_ros.one_thread import one_thread
 from stiction_ros.records import Record

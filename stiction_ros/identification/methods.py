@@ -16,7 +16,7 @@ from stiction_ros.identification.identification_options import IdentificationOpt
 from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
 from stiction_ros.identification.result import Identification
 from stiction_ros.identification.side_by_side import at_once
-from stiction_ros.intake.record_file import record_of
+from stiction_ros.intake.intake import record_of
 from stiction_ros.one_thread import one_thread
 from stiction_ros.records.record import Record
 

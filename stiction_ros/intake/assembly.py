@@ -12,11 +12,10 @@ from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake import repairs
 from stiction_ros.intake.clocks import put_right
 from stiction_ros.intake.intake_options import IntakeOptions
-from stiction_ros.intake.loop import Loop
+from stiction_ros.intake.loop import Loop, columns_of, modes_of, spreads_of
 from stiction_ros.intake.modes import manual_marked
 from stiction_ros.intake.plausible import in_percent, refuse_swapped, refuse_twice
 from stiction_ros.intake.reported import at_pv, is_reported, on_grid
-from stiction_ros.intake.shown import columns_of, modes_of, spreads_of
 from stiction_ros.intake.tables.block import Block, joined
 from stiction_ros.records.parts import ALIKE
 from stiction_ros.records.record import Record

@@ -14,7 +14,7 @@ from stiction_ros.intake.repairs import Rules
 from stiction_ros.intake.sheets.cells import number
 from stiction_ros.intake.tables.block import Block
 from stiction_ros.intake.words import pattern_of
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 from stiction_ros.texts import plural
 
 AUTOMATIC, MANUAL = pattern_of("automatic"), pattern_of("manual")

@@ -14,7 +14,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.intake.words import WORDS
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 from stiction_ros.records.regular import spread_evenly
 from stiction_ros.signals.holds import stretches
 from stiction_ros.texts import plural

@@ -13,7 +13,7 @@ from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.repairs import Rules
 from stiction_ros.intake.tables.block import Block, Column, Key
-from stiction_ros.records.quality import Quality, QualityArray
+from stiction_ros.records.record import Quality, QualityArray
 from stiction_ros.records.regular import GAP
 from stiction_ros.texts import plural
 

@@ -95,7 +95,6 @@ class PiController:
     def __init__(
         self, tuning: PiTuning, sample_time: float, op: float, limits: tuple[float, float]
     ) -> None:
-        """Start from ``op`` with no error."""
         self.tuning = tuning
         self.sample_time = sample_time
         self.limits = limits

@@ -206,7 +206,7 @@ class LoopModel:
             >>> len(simulate(sticky, samples=300))
             300
         """
-        from stiction_ros.loop.systems import process_of
+        from stiction_ros.loop.yaml_process import process_of
 
         with foreign("system"):
             process = process_of(system, sample_time, dead_time)

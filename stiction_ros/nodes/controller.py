@@ -1,5 +1,6 @@
 """The controller: pv and sp in, op out; swaps to what the estimator finds."""
 
+import dataclasses
 import time
 from collections import deque
 from typing import Any
@@ -10,18 +11,21 @@ from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import StepResult
+from stiction_ros.control import ControlMode, StepResult
+from stiction_ros.effects import from_mapping
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
+from stiction_ros.nodes.controller_inputs import ControllerInputs
+from stiction_ros.nodes.estimates import tested_message
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, diagnosis, joint_state, to_ns, trajectory
 from stiction_ros.nodes.shared.peers import publishers_of
 from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.topics.controller_inputs import ControllerInputs
-from stiction_ros.nodes.topics.estimates import tested_message
-from stiction_ros.online.controller.rehearsal import rehearse
+from stiction_ros.online.controller.live import LiveController
+from stiction_ros.online.controller.making import thinned_plan
+from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.controller.testing import ValveTestingController
-from stiction_ros.online.handover.background import AtOnce, Beside
+from stiction_ros.online.handover.hand_over import AtOnce, Beside
 from stiction_ros.online.input.port import InputPort
 from stiction_ros.online.input.port_health import PortHealth, keys
 from stiction_ros.online.input.samples import PortRules, Sample
@@ -32,6 +36,29 @@ QUICKEST, SLOWEST = 0.02, 0.25  # s between two looks for samples that are due
 LEARNS = ("auto", "valve_test")
 """Modes in which the controller waits for the fits of the estimator."""
 GRAPH_PERIOD = 1.0  # s between two looks at who commands
+STEPS = 3
+MODES = (ControlMode.UNAWARE, ControlMode.EMBEDDING)
+FRICTION = {"effect": "stiction", "law": "he", "f_s": 5.0, "f_d": 2.0}
+
+
+def rehearse(settings: LiveControllerSettings, model: LoopModel) -> None:
+    """Load and warm what a step needs, before and after a swap; nothing is left of it.
+
+    The first step of a process takes ten times as long as those that follow: solvers are
+    loaded, and memory is laid out.
+    """
+    sticky = model.with_valve_effects(
+        {name: [from_mapping(FRICTION)] for name in model.valve_names}
+    )
+    for mode in MODES:
+        try:
+            live = LiveController(dataclasses.replace(settings, mode=mode.value), sticky)
+        except InputError:  # these settings know this friction only; the swap would say why
+            continue
+        for k in range(STEPS):
+            result = live.step(model.pv0, model.pv0 + 0.01 * k)
+        thinned_plan(live.observed, result, 2)
+        live.close()
 
 
 class ControllerNode(ControllerInputs):
@@ -40,7 +67,6 @@ class ControllerNode(ControllerInputs):
     settings: ControllerNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
-        """Build the node ``controller``; ``kwargs`` go to the ROS node."""
         super().__init__("controller", ControllerNodeSettings, **kwargs)
         self._late_timer: Timer | None = None
         self.listening = False
@@ -225,7 +251,7 @@ class ControllerNode(ControllerInputs):
         before, self._result = self._result, result
         if result.reason:
             self.noticed.notice("step", "warn", result.reason)
-        rows, picks = self.live.prediction(result, self.settings.prediction_points)
+        rows, picks = thinned_plan(self.live.observed, result, self.settings.prediction_points)
         times = (picks * self.model.sample_time).tolist()
         self._prediction.publish(trajectory(stamp, self._plan_names, rows, times))
         self._tell_changes()

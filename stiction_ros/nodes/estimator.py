@@ -15,18 +15,20 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
 from stiction_ros.loop import LoopModel
+from stiction_ros.nodes.estimates import (
+    figures_of,
+    finding_status,
+    fit_status,
+    friction_message,
+    look_status,
+    monitor_status,
+    verdicts_of,
+)
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, to_ns, values_of
 from stiction_ros.nodes.shared.peers import PLANTS
 from stiction_ros.nodes.shared.runner import run
 from stiction_ros.nodes.shared.typed import trigger
-from stiction_ros.nodes.topics.estimates import (
-    figures_of,
-    fit_status,
-    friction_message,
-    verdicts_of,
-)
-from stiction_ros.nodes.topics.gap_status import finding_status, look_status, monitor_status
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.online.health import stopped_after
@@ -44,7 +46,6 @@ class EstimatorNode(ManagedNode):
     settings: EstimatorNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
-        """Build the node ``estimator``; ``kwargs`` go to the ROS node."""
         super().__init__("estimator", EstimatorNodeSettings, **kwargs)
         self._worker: FitWorker | None = None
 

@@ -20,8 +20,7 @@ from stiction_ros.nodes.shared.runner import run
 from stiction_ros.nodes.shared.typed import trigger
 from stiction_ros.online.plain_settings import OpcuaNodeSettings
 from stiction_ros.opcua import require_asyncua
-from stiction_ros.opcua.heartbeat import IDENTITIES
-from stiction_ros.opcua.loop_bridge import BridgeRules, LoopBridge, WriteOrder
+from stiction_ros.opcua.loop_bridge import IDENTITIES, BridgeRules, LoopBridge, WriteOrder
 from stiction_ros.opcua.plant_link import Heard, Linked, LinkSettings, PlantLink, Refused, Written
 from stiction_ros.opcua.security import Credentials
 from stiction_ros.opcua.tag_map import LoopTags, TagMap, check_address
@@ -38,7 +37,6 @@ class OpcuaNode(ManagedNode):
     settings: OpcuaNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
-        """Build the node ``opcua``; ``kwargs`` go to the ROS node."""
         super().__init__("opcua", OpcuaNodeSettings, **kwargs)
         self._link: PlantLink | None = None
         self._pacer: Timer | None = None

@@ -11,8 +11,7 @@ from stiction_ros.nodes.shared.peers import Outlet
 from stiction_ros.online.input.op_port import Reception
 from stiction_ros.opcua.grant import Grant
 from stiction_ros.opcua.loop_bridge import LoopBridge
-from stiction_ros.opcua.reading import TagQuality
-from stiction_ros.opcua.sampling import PlantSample
+from stiction_ros.opcua.sampling import PlantSample, TagQuality
 from stiction_ros.opcua.tag_map import LoopTags
 
 COUNTED = ("past", "ahead", "late", "bad", "skipped", "new_runs")

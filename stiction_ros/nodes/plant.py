@@ -23,8 +23,7 @@ from stiction_ros.nodes.shared.typed import restart
 from stiction_ros.online.health import stopped_after
 from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
 from stiction_ros.online.plain_settings import PlantNodeSettings
-from stiction_ros.online.round_trips import RoundTrips
-from stiction_ros.online.tick_grid import TickGrid
+from stiction_ros.online.round_trips import RoundTrips, TickGrid
 
 AGAIN = 1.0  # s after which a sample in lockstep is shown again
 UNEASY = 3.0  # s without op after which a run in lockstep says so
@@ -57,7 +56,6 @@ class PlantNode(ManagedNode):
     settings: PlantNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
-        """Build the node ``plant``; ``kwargs`` go to the ROS node."""
         super().__init__("plant", PlantNodeSettings, **kwargs)
         self._pacer: Timer | None = None
 

@@ -12,9 +12,8 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stiction_ros.errors import InputError
-from stiction_ros.nodes.shared.endpoints import message_class
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS, ManagedNode
-from stiction_ros.nodes.shared.messages import SECOND, to_stamp
+from stiction_ros.nodes.shared.messages import SECOND, message_class, to_stamp
 from stiction_ros.nodes.shared.peers import Outlet
 from stiction_ros.nodes.shared.runner import run
 from stiction_ros.nodes.shared.typed import quality
@@ -35,7 +34,6 @@ class PlayerNode(ManagedNode):
     settings: PlayerNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
-        """Build the node ``player``; ``kwargs`` go to the ROS node."""
         super().__init__("player", PlayerNodeSettings, **kwargs)
         self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
         self._pacer: Timer | None = None

@@ -1,9 +1,10 @@
 """The recorder: every topic of the graph into one MCAP bag."""
 
 import itertools
+import re
 import struct
 import time
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,8 @@ from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from stiction_ros.errors import InputError
-from stiction_ros.nodes.shared.endpoints import message_class, offered_qos, reader_qos
 from stiction_ros.nodes.shared.managed import READER_QOS, ManagedNode
-from stiction_ros.nodes.shared.messages import SECOND
+from stiction_ros.nodes.shared.messages import SECOND, message_class, offered_qos, reader_qos
 from stiction_ros.nodes.shared.peers import Inlet
 from stiction_ros.nodes.shared.runner import run
 from stiction_ros.nodes.shared.typed import RawTake, subscribe_raw
@@ -25,7 +25,6 @@ from stiction_ros.online.health import Noticed
 from stiction_ros.online.plain_settings import RecorderNodeSettings
 from stiction_ros.records.bag.finish import CLOCK
 from stiction_ros.records.bag.message_definitions import definition
-from stiction_ros.records.bag.topic_choice import OWN, topic_choice
 from stiction_ros.records.bag.writer import BagWriter, Packing, Splitting
 from stiction_ros.records.run.loop_signals import JOINT_STATE
 from stiction_ros.records.storage.log_time import SIMULATED, LogTime
@@ -34,6 +33,36 @@ DISCOVERY_PERIOD = 0.05  # s between two looks at the graph
 BAG_PERIOD = 1.0  # s between two looks at the bag
 CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
 _STAMP = struct.Struct("<iI")  # sec and nanosec behind the 4 bytes of the encapsulation
+OWN = "own"  # in place of an expression: topics of the recorder's namespace and of the graph
+
+GLOBAL = ("clock", "diagnostics", "parameter_events", "rosout")
+
+
+def topic_choice(
+    names: Sequence[str], regex: str, exclude: str, namespace: str = "/"
+) -> Callable[[str], bool]:
+    """Return what tells whether a topic is taken; an empty expression fits nothing.
+
+    Args:
+        names: full names.
+        regex: of full names; :data:`OWN` for the loop of the namespace.
+        exclude: of full names that are left out, also when ``names`` has them.
+        namespace: of the recorder.
+    """
+    if not names and not regex:
+        raise InputError("no topic is chosen", where="recorder", fix="set topics or regex")
+    if regex == OWN:
+        own = re.escape(namespace.rstrip("/"))
+        regex = f"{own}/.*|/({'|'.join(GLOBAL)})" if own else ".*"
+    fits, left_out = _fitting(regex, "regex"), _fitting(exclude, "exclude_regex")
+    return lambda topic: not left_out(topic) and (topic in names or bool(fits(topic)))
+
+
+def _fitting(text: str, key: str) -> Callable[[str], re.Match[str] | None]:
+    try:
+        return re.compile(text).fullmatch if text else lambda _: None
+    except re.error as error:
+        raise InputError(f"no regular expression ({error})", where=f"recorder: {key}") from None
 
 
 class RecorderNode(ManagedNode):
@@ -42,7 +71,6 @@ class RecorderNode(ManagedNode):
     settings: RecorderNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
-        """Build the node ``recorder``; ``kwargs`` go to the ROS node."""
         super().__init__("recorder", RecorderNodeSettings, **kwargs)
         self.writer: BagWriter | None = None
         self._bags: list[Path] = []

@@ -35,8 +35,12 @@ from stiction_ros.online.monitor.gap_finding import GapFinding
 from stiction_ros.online.monitor.gap_monitor import GapLook, MonitorRule
 from stiction_ros.online.monitor.monitoring import Monitoring, check_model
 from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
-from stiction_ros.online.plain_settings import NodeSettings, PlantNodeSettings, RecorderNodeSettings
-from stiction_ros.online.schedule import FitSchedule
+from stiction_ros.online.plain_settings import (
+    FitSchedule,
+    NodeSettings,
+    PlantNodeSettings,
+    RecorderNodeSettings,
+)
 from stiction_ros.records import Record
 from stiction_ros.settings import from_mapping as settings_from_mapping
 

@@ -14,13 +14,12 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.modes import AUTOMATIC
 from stiction_ros.opcua.loop_bridge import mode_text
-from stiction_ros.opcua.reading import TagQuality, TagReading
-from stiction_ros.opcua.sampling import JITTER
+from stiction_ros.opcua.sampling import JITTER, TagQuality, TagReading
 from stiction_ros.opcua.security import Credentials
 from stiction_ros.opcua.session import ANSWER, EPOCH, node_ids, open_client, reading_of
 from stiction_ros.opcua.tag_map import LoopTags
 from stiction_ros.records import Record
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 
 if TYPE_CHECKING:
     from asyncua import Client, ua
@@ -60,7 +59,6 @@ class HistoryFile:
     """
 
     def __init__(self, path: Path) -> None:
-        """Take ``path``, which need not exist."""
         self.path = path
         self._done = path.with_suffix(".done")
 

@@ -10,10 +10,8 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.online.health import stopped_after
 from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
 from stiction_ros.opcua.grant import Facts, GrantState, begin
-from stiction_ros.opcua.heartbeat import HeardBeat, OwnBeat, identity_of
 from stiction_ros.opcua.op_limits import OpLimits, RateWatch
-from stiction_ros.opcua.reading import TagQuality, TagReading
-from stiction_ros.opcua.sampling import LoopSampler, PlantSample
+from stiction_ros.opcua.sampling import LoopSampler, PlantSample, TagQuality, TagReading
 from stiction_ros.opcua.tag_map import GrantTags, LoopTags, Use
 
 PATIENCE = 3  # samples of bad quality in succession before the plant takes over
@@ -22,6 +20,53 @@ SLOW = 2  # a part of the watchdog's time: an answer may take that long
 IN_TIME = 0.5  # s, or a sample where that is longer, in which an OP must be written
 AGAIN = 1.0  # s between two attempts to take a request back
 MODE_REFUSES = "the mode does not grant it"
+IDENTITIES = 1 << 15  # numbers of writers
+COUNT = 1 << 16  # beats until the count begins anew
+
+
+def identity_of(beat: float) -> int:
+    """Return the number of the writer of a beat; 0 is nobody."""
+    return int(beat) // COUNT if 0 <= beat < IDENTITIES * COUNT else -1
+
+
+class OwnBeat:
+    """A number that rises with each beat and bears ours, so that another writer is seen.
+
+    A beat is ``identity`` · 65 536 + count, a whole number of 31 bits.
+    """
+
+    def __init__(self, identity: int) -> None:
+        """Start; ``identity`` in 1 … 32 767, drawn at random by the caller."""
+        self.identity = identity
+        self._count = 0
+
+    def next(self) -> int:
+        """Return the next beat."""
+        self._count = (self._count + 1) % COUNT
+        return self.identity * COUNT + self._count
+
+
+class HeardBeat:
+    """Someone's beat: when it changed last."""
+
+    def __init__(self) -> None:
+        self._value: float | None = None
+        self._changed_at: float | None = None
+
+    def hear(self, value: float, now: float, first: bool) -> None:
+        """Take in a beat at ``now``, s; the ``first`` report of a subscription is no change."""
+        if value != self._value:
+            self._value = value
+            if not first:
+                self._changed_at = now
+
+    def silent_for(self, now: float, since: float) -> float:
+        """Return s since the last beat, or since ``since`` when that is later."""
+        return now - max(since, self._changed_at if self._changed_at is not None else since)
+
+    def beats(self, now: float, within: float) -> bool:
+        """Return whether it has changed in the last ``within`` s."""
+        return self._changed_at is not None and now - self._changed_at <= within
 
 
 @dataclasses.dataclass(frozen=True)

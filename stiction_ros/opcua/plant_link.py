@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.opcua.loop_bridge import WriteOrder
-from stiction_ros.opcua.reading import TagReading
+from stiction_ros.opcua.sampling import TagReading
 from stiction_ros.opcua.security import Credentials
 from stiction_ros.opcua.server_tags import ServerTags
 from stiction_ros.opcua.session import ANSWER, describe, is_open, open_client, reading_of, write

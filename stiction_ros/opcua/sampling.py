@@ -1,12 +1,13 @@
 """Changes of tags, paired to the samples of a loop by one written rule."""
 
 import dataclasses
+import enum
+import math
 from collections import Counter, deque
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.opcua.reading import TagQuality, TagReading
 from stiction_ros.opcua.tag_map import LoopTags
 
 HEARD = 5  # PV stamps of which the freshest tells the plant's time
@@ -20,7 +21,45 @@ DOUBTED = 3  # refused stamps of a tag in succession: what it said before holds 
 SUCCESSION = 10  # refused stamps, or scans beside the grid, in succession are believed
 SCAN = 0.75  # samples from one scan to the next at least
 FOLLOWED = 8  # samples after which most of a shift of the scans is followed
+LOCAL_OVERRIDE = 0x00960000  # OPC UA part 8: put in by hand, so it is no measurement
+
+
+class TagQuality(enum.IntEnum):
+    """How good a value is, the best first; the number stands in ``effort`` of ``pv``."""
+
+    GOOD = 0
+    UNCERTAIN = 1  # such as a last usable value, or one put in by hand
+    BAD = 2
+    SILENT = 3  # nothing is heard of the server, or nothing was ever heard of the tag
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class TagReading:
+    """One report of one tag."""
+
+    value: float | str | None  # as it was sent; None when there was none
+    quality: TagQuality  # of the value
+    stamp: int  # source time stamp, ns
+    first: bool = False  # whether it opens a subscription: the present value, maybe long past
+
+    @property
+    def number(self) -> float:
+        """The value as a finite number, else NaN."""
+        if isinstance(self.value, str) or self.value is None:
+            return math.nan
+        return float(self.value) if math.isfinite(self.value) else math.nan
+
+
 NOTHING = TagReading(None, TagQuality.SILENT, 0)
+
+
+def quality_of(status: int) -> TagQuality:
+    """Return the quality that an OPC UA status code (32 bits) stands for."""
+    severity = status >> 30
+    if severity == 0:
+        overridden = status & 0xFFFF0000 == LOCAL_OVERRIDE
+        return TagQuality.UNCERTAIN if overridden else TagQuality.GOOD
+    return TagQuality.UNCERTAIN if severity == 1 else TagQuality.BAD
 
 
 @dataclasses.dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from stiction_ros.errors import InputError
 from stiction_ros.opcua import security
 from stiction_ros.opcua.loop_bridge import MODE_REFUSES, WriteOrder, mode_text
-from stiction_ros.opcua.reading import TagQuality, TagReading, quality_of
+from stiction_ros.opcua.sampling import TagQuality, TagReading, quality_of
 
 if TYPE_CHECKING:
     from asyncua import Client, ua

@@ -10,7 +10,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
 from stiction_ros.identification.answer.summary import as_html, cause_of
 from stiction_ros.identification.result import CauseKind
-from stiction_ros.intake.record_file import record_of
+from stiction_ros.intake.intake import record_of
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import MOST, SCRIPT, Curve, against, over_time
 from stiction_ros.records.record import Record

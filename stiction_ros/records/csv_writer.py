@@ -10,8 +10,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError, storing
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Record
+from stiction_ros.records.record import Quality, Record
 
 DEFAULT_VALVE = "V1"
 DEFAULT_OUTPUT = "PV1"

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Gap, Record
+from stiction_ros.records.record import Gap, Quality, Record
 
 DATES = 3e8  # seconds from which a time is shown as a date: 1979
 ALIKE = 0.01  # sample times of two parts, one over the other, that count as the same

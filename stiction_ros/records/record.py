@@ -1,6 +1,7 @@
 """One record of a loop: what everything that looks at data takes."""
 
 import dataclasses
+import enum
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -10,10 +11,29 @@ from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.records.quality import USABLE, Quality, QualityArray
 from stiction_ros.signals.holds import stretches
 
 IndexArray = np.ndarray[tuple[int], np.dtype[np.intp]]
+QualityArray = np.ndarray[tuple[int], np.dtype[np.uint8]]
+
+
+class Quality(enum.IntEnum):
+    """What is known of one sample, as one byte of a record's mask."""
+
+    GOOD = 0  # measured
+    HELD = 1
+    """Missing in the source; carried over from its neighbours, or interpolated between them."""
+    BAD = 2  # not to be used; its values may be NaN
+    MANUAL = 3  # measured, but the loop was not in automatic
+
+    @property
+    def word(self) -> str:
+        """The name in files: ``good``, ``held``, ``bad`` or ``manual``."""
+        return self.name.lower()
+
+
+QUALITY_WORDS = {quality.word: quality for quality in Quality}  # word in files to quality
+USABLE = (Quality.GOOD, Quality.HELD)  # what identification works on
 
 
 class Gap(NamedTuple):

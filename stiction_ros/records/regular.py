@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.errors import InputError
-from stiction_ros.records.quality import Quality, QualityArray
+from stiction_ros.records.record import Quality, QualityArray
 
 GAP = 5.5  # a step of more usual steps than this is a gap: the record is split there
 

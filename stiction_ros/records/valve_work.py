@@ -6,8 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Record
+from stiction_ros.records.record import Quality, Record
 
 STANDS = 1e-9  # share of the stem's range up to which a move is rounding
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.records.quality import QualityArray
-from stiction_ros.records.record import Record
+from stiction_ros.records.record import QualityArray, Record
 from stiction_ros.records.regular import HOLE, Part, regular_part, sample_time, split_at_gaps
 
 

@@ -16,16 +16,14 @@ from stiction_ros.identification.valve_test.plan import first_round
 from stiction_ros.intake.loop import Loop
 from stiction_ros.records.csv_writer import DEFAULT_OUTPUT, DEFAULT_VALVE
 from stiction_ros.records.parts import longest_part
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Record
+from stiction_ros.records.record import Quality, Record
 from stiction_ros.records.valve_work import ValveWork
 from stiction_ros.signals.controller_recovery import resting_limits
 from stiction_ros.signals.oscillation import REGULAR
-from stiction_ros.survey.beats import beats
-from stiction_ros.survey.entry import Cycling, Entry, Status
+from stiction_ros.survey.entry import Cycling, Entry, Status, SurveyOptions
+from stiction_ros.survey.groups import beats
 from stiction_ros.survey.pages.loop_page import loop_page
 from stiction_ros.survey.pages.words import cause_words
-from stiction_ros.survey.survey_options import SurveyOptions
 
 FEWEST = 100  # samples in automatic below which nothing is judged
 NEAR_LIMIT = 1e-6  # share of OP's range within which it stands at an end of it

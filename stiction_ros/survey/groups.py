@@ -1,21 +1,67 @@
-"""Loops that cycle together, the likely source first.
+"""Which loops cycle together, and in which order they are serviced.
 
-A valve that makes its own loop cycle moves what lies around it at its period, so its loop comes
-first; then one that rings by its tuning; last what only bears a wave. The more regular is nearer.
+Two loops cycle together where their cycles begin at one phase of each other. In a group the likely
+source comes first: a valve that makes its own loop cycle moves what lies around it at its period;
+then a loop that rings by its tuning; last what only bears a wave. The more regular is nearer.
+
+The order of service:
+
+1. *Kind*: valves found that make their loop cycle; those found whose cycle has another cause;
+   undecided valves; healthy valves in loops that cycle; the rest; what was not judged.
+2. Among one kind *P × what a service would bring*: the probability of friction by the share of the
+   loop's movement that goes away without the friction, simulated; where a cost was given it
+   is multiplied by what the cycle costs over the median of what was given.
 """
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records.parts import DATES
-from stiction_ros.survey.beats import ALIKE, locked
-from stiction_ros.survey.entry import Entry
+from stiction_ros.signals.oscillation import moving, size, turnings
+from stiction_ros.survey.entry import Entry, Status
 
 NEARNESS = {"valve": 0, "tuning": 1, "unknown": 2, "none": 2, "disturbance": 3, "set_point": 4}
 """Place of a cause in the search for a source."""
+MOST = 200  # beats that are kept of a record, the last ones
+FEWEST = 5  # beats of one loop from which two can be compared
+ALIKE = 0.05  # logarithm of the ratio of two periods up to which they may be the same
+
+LOCKED = 0.85
+"""Mean resultant length of the phases from which on two loops keep the same time: 1 is to the
+sample; two cycles of their own that part by half a turn within the record come to .64."""
+
+
+def beats(error: FloatArray, period: float) -> FloatArray:
+    """Return the samples, not whole, at which PV − SP, (N,), sets out upwards through its mean."""
+    moved = moving(error, period)
+    rows = []
+    for k in turnings(moved, 0.3 * size(moved)).tolist():
+        if moved[k] > 0.0:
+            a = int(np.flatnonzero(moved[:k] <= 0.0)[-1])
+            rows.append(a + float(moved[a] / (moved[a] - moved[a + 1])))
+    return np.array(rows[-MOST:])
+
+
+def locked(one: FloatArray, other: FloatArray) -> bool:
+    """Tell whether two loops' beats, s on one clock, keep the same time: one begins at one phase.
+
+    References:
+        K. V. Mardia, P. E. Jupp: Directional Statistics, Wiley 2000, section 2.3.
+    """
+    if min(len(one), len(other)) < 2:
+        return False
+    periods = [float(np.median(np.diff(each))) for each in (one, other)]
+    if min(periods) <= 0.0 or abs(np.log(periods[0] / periods[1])) > ALIKE:
+        return False
+    inside = one[(one >= other[0]) & (one <= other[-1])]
+    if len(inside) < FEWEST:
+        return False
+    phase = np.interp(inside, other, np.arange(len(other), dtype=float))
+    return bool(np.abs(np.mean(np.exp(2j * np.pi * phase))) >= LOCKED)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,3 +119,48 @@ def _nearness(entry: Entry) -> tuple[int, float, float, str]:
     regular = 0.0 if entry.oscillation is None else entry.oscillation.regularity
     place = NEARNESS.get(entry.cause or "none", len(NEARNESS))
     return place, -(entry.probability or 0.0), -regular, entry.name
+
+
+def kind(entry: Entry) -> int:
+    """Return the kind of a loop, 0 first."""
+    if entry.status is not Status.OK:
+        return 5
+    if entry.found:
+        return 0 if entry.cause == "valve" else 1
+    if entry.verdict == "undecided":
+        return 2
+    return 3 if entry.cause not in (None, "none") else 4
+
+
+def ranked(entries: Sequence[Entry], costs: Mapping[str, float]) -> list[Entry]:
+    """Return the entries in their order with rank and what their cycles cost.
+
+    The ``costs`` by name are money per hour for a |PV − SP| of one engineering unit.
+    """
+    priced = [
+        dataclasses.replace(entry, cost_per_hour=_cost(entry, costs.get(entry.name)))
+        for entry in entries
+    ]
+    known = [entry.cost_per_hour for entry in priced if entry.cost_per_hour]
+    usual = float(np.median(known)) if known else 1.0
+
+    def worth(entry: Entry) -> float:
+        money = 1.0 if entry.cost_per_hour is None else entry.cost_per_hour / usual
+        gone = min(max(entry.evidence.get("loop_gone", 0.0), 0.0), 1.0) if entry.found else 1.0
+        return (entry.probability or 0.0) * gone * money
+
+    order = sorted(priced, key=lambda entry: (kind(entry), -worth(entry), entry.name))
+    return [dataclasses.replace(entry, rank=place) for place, entry in enumerate(order, start=1)]
+
+
+def _cost(entry: Entry, cost: float | None) -> float | None:
+    """Return what the cycle costs an hour: what a service saves, else the mean of a sine."""
+    if cost is None or entry.status is not Status.OK:
+        return None
+    if entry.gain:
+        now, service = entry.gain.get("now") or {}, entry.gain.get("service") or {}
+        before, after = now.get("iae_per_hour"), service.get("iae_per_hour")
+        if before is not None and after is not None:
+            return cost * max(float(before) - float(after), 0.0)
+    amplitude = 0.0 if entry.oscillation is None else entry.oscillation.amplitude
+    return float(cost * 2.0 / np.pi * amplitude)

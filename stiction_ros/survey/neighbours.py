@@ -15,9 +15,8 @@ from stiction_ros.intake.loop import Loop
 from stiction_ros.loop.member_loops import is_set_point
 from stiction_ros.records.record import Record
 from stiction_ros.survey.assess import assess
-from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.entry import Entry, SurveyOptions
 from stiction_ros.survey.groups import Group, grouped
-from stiction_ros.survey.survey_options import SurveyOptions
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,11 +11,9 @@ from typing import IO, Any
 from stiction_ros.errors import InputError
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.engines.engine import Engine, Task
-from stiction_ros.survey.entry import Entry, Status
-from stiction_ros.survey.groups import Group, grouped
+from stiction_ros.survey.entry import Entry, Status, SurveyOptions
+from stiction_ros.survey.groups import Group, grouped, ranked
 from stiction_ros.survey.journal import Journal, key_of
-from stiction_ros.survey.ranking import ranked
-from stiction_ros.survey.survey_options import SurveyOptions
 
 PAGES = "loops"
 LOG = "survey.log"

@@ -32,7 +32,7 @@ from exports import (
 
 from stiction_ros.intake.intake_options import OpUnit, TimeUnit
 from stiction_ros.intake.sheets.stamps import DateOrder
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "cp1252"])

@@ -9,7 +9,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from exports import HEADER, ROWS, iso, one, op, pv, said, table, text, write
 
 from stiction_ros.intake import Loop
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 
 BAD = range(30, 33)
 

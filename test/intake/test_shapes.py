@@ -26,7 +26,7 @@ from exports import (
 )
 
 from stiction_ros.intake import CsvColumns, Loop
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 
 
 def long(tag: str = "FIC7.{}", rows: int = ROWS) -> list[list[str]]:

@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from exports import one
 
 from stiction_ros.intake.sheets.names import Tag, read_tag
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 
 
 @pytest.mark.parametrize(

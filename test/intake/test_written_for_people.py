@@ -10,7 +10,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from exports import BEGIN, HEADER, ROWS, STEP, check, one, op, pv, said, table, text, write
 
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 
 
 @pytest.mark.parametrize("units", [(" %", " t/h"), ("%", " bar"), (" %", " °C"), ("%", "°C")])

@@ -16,6 +16,7 @@ from small_loop import SAMPLES, write_small_scenario
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "records"))
+from as_given import run_metadata
 from foreign_readers import differences
 
 from stiction_ros.cli.shared.node_processes import NodeProcesses, ros_environment
@@ -23,7 +24,6 @@ from stiction_ros.online.replays.result import Match
 from stiction_ros.online.replays.run import replay
 from stiction_ros.online.session import Scenario, run_live
 from stiction_ros.records.bag.messages import read_messages
-from stiction_ros.records.bag.run_metadata import run_metadata
 from stiction_ros.records.run.log import RunLog, read_run
 
 PATIENCE = 120.0

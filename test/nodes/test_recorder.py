@@ -5,10 +5,14 @@ from typing import Any
 
 import pytest
 
+from stiction_ros.errors import InputError
+from stiction_ros.nodes.recorder import topic_choice
+
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 
 from collections.abc import Iterator
 
+from as_given import run_metadata
 from graph import Graph
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
@@ -16,7 +20,6 @@ from std_msgs.msg import String
 from stiction_ros.nodes import recorder
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.records.bag.messages import read_messages, read_raw
-from stiction_ros.records.bag.run_metadata import run_metadata
 from stiction_ros.records.storage.mcap_scan import McapScan
 
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -235,3 +238,34 @@ def test_a_bag_that_cannot_be_finished_is_a_failure_and_can_be_read(
     desk.recorder.finish()
     assert "not finished (No space left on device)" in desk.recorder.failure
     assert len(list(read_raw(desk.bag))) == 1
+
+
+@pytest.mark.parametrize(
+    ("names", "regex", "exclude", "chosen"),
+    [
+        ([], ".*", "", ["/pv", "/op", "/a/pv"]),
+        (["/pv"], "", "", ["/pv"]),
+        (["/op"], ".*/pv", "", ["/pv", "/op", "/a/pv"]),
+        ([], "/pv", "", ["/pv"]),
+        (["/pv", "/op"], "", "/p.*", ["/op"]),
+        ([], ".*", "/a/.*", ["/pv", "/op"]),
+    ],
+)
+def test_names_and_expressions(
+    names: list[str], regex: str, exclude: str, chosen: list[str]
+) -> None:
+    choice = topic_choice(names, regex, exclude)
+    assert [topic for topic in ("/pv", "/op", "/a/pv") if choice(topic)] == chosen
+
+
+@pytest.mark.parametrize(
+    ("names", "regex", "exclude", "said"),
+    [
+        ([], "", "", "no topic is chosen; set topics or regex"),
+        ([], "(", "", "recorder: regex: no regular expression"),
+        (["/pv"], "", "[", "recorder: exclude_regex: no regular expression"),
+    ],
+)
+def test_errors(names: list[str], regex: str, exclude: str, said: str) -> None:
+    with pytest.raises(InputError, match=said.replace("(", r"\(")):
+        topic_choice(names, regex, exclude)

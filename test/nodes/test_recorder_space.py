@@ -22,7 +22,7 @@ from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_stamp
 from stiction_ros.online.health import Noticed
 from stiction_ros.records.bag.messages import read_messages, read_raw
-from stiction_ros.records.run.bag_reader import read_bag_parts
+from stiction_ros.records.run.loop_runs import read_bag_parts
 
 
 @pytest.fixture(autouse=True)

@@ -1,6 +1,6 @@
 """A tag map of one loop with one valve, and readings for it."""
 
-from stiction_ros.opcua.reading import TagQuality, TagReading
+from stiction_ros.opcua.sampling import TagQuality, TagReading
 from stiction_ros.opcua.tag_map import GrantTags, LoopTags, OutputTags, ValveTags
 
 SECOND = 1_000_000_000

@@ -8,9 +8,16 @@ from small_maps import ALIVE, BEAT, MODE, OP, PV, ROUT, SP, bad, good, loop_tags
 
 from stiction_ros.online.input.op_port import Reception
 from stiction_ros.opcua.grant import GrantState
-from stiction_ros.opcua.heartbeat import HeardBeat, OwnBeat, identity_of
-from stiction_ros.opcua.loop_bridge import BridgeRules, LoopBridge, WriteOrder, mode_text
-from stiction_ros.opcua.reading import TagQuality, TagReading
+from stiction_ros.opcua.loop_bridge import (
+    BridgeRules,
+    HeardBeat,
+    LoopBridge,
+    OwnBeat,
+    WriteOrder,
+    identity_of,
+    mode_text,
+)
+from stiction_ros.opcua.sampling import TagQuality, TagReading
 from stiction_ros.opcua.tag_map import Use, ValveTags
 
 SENDER = "/unit/controller"

@@ -11,8 +11,7 @@ from test_loop_bridge import Plant
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 
 from stiction_ros.nodes.opcua_topics import LoopTopics
-from stiction_ros.opcua.reading import TagQuality
-from stiction_ros.opcua.sampling import PlantSample
+from stiction_ros.opcua.sampling import PlantSample, TagQuality
 
 
 class Status:

@@ -8,8 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small_maps import OP, PV, SP, at, bad, good, loop_tags
 
-from stiction_ros.opcua.reading import LOCAL_OVERRIDE, TagQuality, TagReading, quality_of
-from stiction_ros.opcua.sampling import LoopSampler, PlantClock, PlantSample
+from stiction_ros.opcua.sampling import (
+    LOCAL_OVERRIDE,
+    LoopSampler,
+    PlantClock,
+    PlantSample,
+    TagQuality,
+    TagReading,
+    quality_of,
+)
 
 
 class Scans:

@@ -11,7 +11,7 @@ from stiction_ros.config_files import find_config
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.nodes.shared.parameter_files import unused
+from stiction_ros.nodes.shared.runner import unused
 from stiction_ros.online.session import read_nodes
 
 

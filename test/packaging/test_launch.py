@@ -12,7 +12,7 @@ import yaml
 from stiction_ros.cli.shared.scenarios import SCENARIOS, STARTED, bridged_nodes, find, loop_nodes
 from stiction_ros.errors import InputError
 from stiction_ros.nodes.__main__ import NODES
-from stiction_ros.nodes.shared.parameter_files import applies, node_keys
+from stiction_ros.nodes.shared.runner import applies, node_keys
 
 LAUNCH = Path(__file__).resolve().parents[2] / "launch" / "stiction.launch.py"
 

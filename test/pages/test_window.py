@@ -8,7 +8,7 @@ from made import identification, record
 
 from stiction_ros.identification.result import CauseKind, FitStatus, Identification
 from stiction_ros.pages.signals import CYCLES, UNCYCLED, Window
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 
 PERIOD, SAMPLES = 60.0, 1200
 

@@ -7,10 +7,13 @@ from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.intake import is_bag, one_loop
 from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions, OpUnit, TimeUnit
 from stiction_ros.intake.sheets.typed import open_sheets
+from stiction_ros.records.bag.run_metadata import merged
 from stiction_ros.records.csv_writer import tagged_columns
 from stiction_ros.records.parts import only_part
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.bag_reader import read_bag_parts
+from stiction_ros.records.run.loop_runs import read_bag_parts
+from stiction_ros.records.storage.files import storage_files
+from stiction_ros.records.storage.mcap_scan import McapScan
 
 
 def read_csv(
@@ -111,3 +114,13 @@ def open_parts(
         said = "is a CSV file, which has no namespaces"
         raise InputError(said, where=str(path), fix="leave --namespace out")
     return read_csv_parts(path, columns)
+
+
+def run_metadata(path: Path) -> dict[str, str]:
+    """Return what a bag says of its run."""
+    found: list[tuple[str, dict[str, str]]] = []
+    for file in storage_files(path):
+        scan = McapScan(file)
+        list(scan.messages())
+        found += scan.metadata
+    return merged(found)

@@ -10,12 +10,13 @@ from rosbags.typesys import Stores, get_typestore
 from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.parts import only_part
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.bag_reader import read_bag_parts
-from stiction_ros.records.storage.bag_metadata import LATCHED, Qos
+from stiction_ros.records.run.loop_runs import read_bag_parts
+from stiction_ros.records.storage.bag_metadata import Qos
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 JOINT_STATE = "sensor_msgs/msg/JointState"
 SECOND = 10**9
+LATCHED = Qos(depth=1, durability="transient_local")
 
 
 def read_bag(path: Path, namespace: str | None = None) -> Record:

@@ -20,7 +20,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.bag.repair import repair_bag
 from stiction_ros.records.bag.writer import BagWriter
-from stiction_ros.records.run.bag_reader import read_bag_parts
+from stiction_ros.records.run.loop_runs import read_bag_parts
 
 DEFINITION, _ = STORE.generate_msgdef(JOINT_STATE, ros_version=2)
 SAMPLES = 200

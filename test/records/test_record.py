@@ -14,9 +14,8 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.csv_writer import write_csv
 from stiction_ros.records.parts import joined, longest_part, only_part
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Gap, Record, Segment
-from stiction_ros.records.run.bag_reader import read_bag_parts
+from stiction_ros.records.record import Gap, Quality, Record, Segment
+from stiction_ros.records.run.loop_runs import read_bag_parts
 
 G, H, B, M = Quality.GOOD, Quality.HELD, Quality.BAD, Quality.MANUAL
 

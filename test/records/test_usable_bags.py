@@ -13,9 +13,9 @@ from bag_making import JOINT_STATE, SECOND, Bag, joint_state, read_bag
 
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.run.bag_reader import read_bag_parts
+from stiction_ros.records.record import Quality
 from stiction_ros.records.run.log import read_run
+from stiction_ros.records.run.loop_runs import read_bag_parts
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "identification"))
 from simulated_loops import example1

@@ -14,7 +14,7 @@ from stiction_ros.cli.main import main
 from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.bag.playback import offered_qos
 from stiction_ros.records.bag.writer import BagWriter
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 from stiction_ros.records.run.log import RunLog, read_run
 from stiction_ros.records.storage.mcap_scan import RawMessage
 

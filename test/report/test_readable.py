@@ -11,8 +11,8 @@ from stiction_ros.discrepancy import GapOptions, find_discrepancy
 from stiction_ros.effects import from_mapping
 from stiction_ros.loop import LoopModel, SetPoints, simulate
 from stiction_ros.records.run.log import RunLog
-from stiction_ros.report.gap.report import report_gap
-from stiction_ros.report.record.report import report_record
+from stiction_ros.report.gap_page import report_gap
+from stiction_ros.report.record_page import report_record
 from stiction_ros.report.run.report import write_run
 from stiction_ros.report.run.story import tell
 

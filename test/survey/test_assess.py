@@ -8,12 +8,10 @@ from stiction_ros.intake.loop import Loop
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.closed_loop import PiController, simulate_closed_loop
 from stiction_ros.loop.set_points import SetPoints
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Record
+from stiction_ros.records.record import Quality, Record
 from stiction_ros.survey import assess as module
 from stiction_ros.survey.assess import Assessed, assess, at_limits
-from stiction_ros.survey.entry import Status
-from stiction_ros.survey.survey_options import SurveyOptions
+from stiction_ros.survey.entry import Status, SurveyOptions
 
 MODEL = {
     "loop": "FIC1",

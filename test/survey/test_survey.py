@@ -11,10 +11,9 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.assess import Assessed
 from stiction_ros.survey.engines.engine import Done, Task, lost
-from stiction_ros.survey.entry import Entry, Status
+from stiction_ros.survey.entry import Entry, Status, SurveyOptions
 from stiction_ros.survey.listing.tables import HEAD, write_csv, write_xlsx
 from stiction_ros.survey.survey import Plan, survey
-from stiction_ros.survey.survey_options import SurveyOptions
 
 KEYS = {
     *("name", "files", "status", "reason", "samples", "sample_time", "auto_share"),

@@ -28,7 +28,7 @@ from stiction_ros.identification.linear.subspace import (
     SubspaceOptions,
     fit_state_space,
 )
-from stiction_ros.intake.record_file import record_of
+from stiction_ros.intake.intake import record_of
 from stiction_ros.records.record import Record
 from stiction_ros.signals.subspace_projection import SubspaceMethod
 from stiction_ros.signals.velocity_form import explained

@@ -23,8 +23,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Record
+from stiction_ros.records.record import Quality, Record
 from stiction_ros.signals.arx import lagged
 
 TOO_SHORT = "take a longer record, lower orders or a narrower delay range"

@@ -13,8 +13,7 @@ from stiction_ros.identification.valve_test.frictions import SMALLEST
 from stiction_ros.identification.valve_test.judgement import Judgement, judged, measured_enough
 from stiction_ros.identification.valve_test.plan import CLEAR, WIDENS, Facts
 from stiction_ros.identification.valve_test.steps import SHORTEST, Steps
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Record
+from stiction_ros.records.record import Quality, Record
 
 LAGS = 1.8
 """Lags of a hold: PV then shows five sixths of its answer, the model tells the rest."""

@@ -13,7 +13,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.intake.sheets.cells import Wrong
 from stiction_ros.intake.sheets.names import Tag
 from stiction_ros.intake.sheets.stamps import Clock, Times
-from stiction_ros.records.quality import QualityArray
+from stiction_ros.records.record import QualityArray
 
 FlagArray = NDArray[np.bool_]
 

@@ -16,12 +16,11 @@ from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.stamps import Clock, Stamps, Times
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, in_seconds
-from stiction_ros.intake.tables.one_value import OneValue
-from stiction_ros.intake.tables.plan import Plan
+from stiction_ros.intake.tables.plan import OneValue, Plan
 from stiction_ros.intake.tables.qualities import bad_qualities
 from stiction_ros.intake.tables.tags import TagList
 from stiction_ros.records.csv_writer import QUALITY
-from stiction_ros.records.quality import QUALITY_WORDS, QualityArray
+from stiction_ros.records.record import QUALITY_WORDS, QualityArray
 
 Reader = tuple[int, Numbers] | tuple[int, Words]
 

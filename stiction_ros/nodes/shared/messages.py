@@ -1,17 +1,23 @@
-"""Between arrays and the messages of common_interfaces."""
+"""Between arrays and the messages of common_interfaces, and the topics that carry them."""
 
+import importlib
 import itertools
 from array import array
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.nodes.shared.typed import quality
+from stiction_ros.records.storage.bag_metadata import INFINITE_NS, Qos
 
 if TYPE_CHECKING:  # nodes that control nothing load nothing of control
     from stiction_ros.control import StepResult
@@ -109,4 +115,46 @@ def status(
         level=LEVELS[level],
         message=text,
         values=[KeyValue(key=key, value=str(value)) for key, value in values],
+    )
+
+
+def message_class(kind: str) -> Any:
+    """Return the class of the messages of type ``sensor_msgs/msg/JointState``.
+
+    Raises:
+        InputError: its package is not installed.
+    """
+    package, _, name = kind.partition("/msg/")
+    try:
+        return getattr(importlib.import_module(f"{package}.msg"), name)
+    except (ImportError, AttributeError, ValueError):
+        raise InputError(
+            f"type {kind} is not installed", fix=f"install and source the package {package}"
+        ) from None
+
+
+def offered_qos(info: TopicEndpointInfo) -> Qos:
+    """Return what a publisher offers, as a bag notes it."""
+    profile = info.qos_profile
+    return Qos(
+        history="keep_last",
+        depth=profile.depth,
+        reliability=profile.reliability.name.lower(),
+        durability=profile.durability.name.lower(),
+        deadline=int(profile.deadline.nanoseconds) or INFINITE_NS,
+        lifespan=int(profile.lifespan.nanoseconds) or INFINITE_NS,
+        liveliness=profile.liveliness.name.lower(),
+        liveliness_lease_duration=int(profile.liveliness_lease_duration.nanoseconds) or INFINITE_NS,
+    )
+
+
+def reader_qos(offered: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
+    """Return the strongest QoS that every one of the publishers serves."""
+    profiles = [info.qos_profile for info in offered]
+    reliable = all(p.reliability is ReliabilityPolicy.RELIABLE for p in profiles)
+    latched = all(p.durability is DurabilityPolicy.TRANSIENT_LOCAL for p in profiles)
+    return quality(
+        depth,
+        ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )

@@ -28,7 +28,6 @@ class Patience:
     """
 
     def __init__(self) -> None:
-        """Start with patience."""
         self._in_vain = False
 
     def wait(self, publisher: Publisher) -> None:

@@ -12,16 +12,12 @@ from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.controller.making import controller_of, design_for
-from stiction_ros.online.controller.plan_points import thinned_plan
 from stiction_ros.online.controller.settings import LiveControllerSettings
-from stiction_ros.online.handover.approach import Approach
-from stiction_ros.online.handover.background import AtOnce, Background
-from stiction_ros.online.handover.hand_over import HandOver
+from stiction_ros.online.handover.hand_over import AtOnce, Background, HandOver, Past
 from stiction_ros.online.handover.known_friction import alike, frictions_of
 from stiction_ros.online.handover.offers import Judge, last_samples
-from stiction_ros.online.handover.past import Past
-from stiction_ros.online.handover.watch import Watch
-from stiction_ros.online.input.applied_op import Given
+from stiction_ros.online.handover.watch import Approach, Watch
+from stiction_ros.online.input.op_port import Given
 
 HISTORY_SAMPLES = 20_000
 FIRST_MOVE = 0.9  # %; largest move of the first OP after a start or a hold
@@ -350,15 +346,6 @@ class LiveController:
         self._raised = None
         self._take(change, controller)
         self._watch.begin(last_samples(change.model))
-
-    def prediction(self, result: StepResult, points: int) -> tuple[FloatArray, FloatArray]:
-        """Return the plan of the last step, thinned for a message.
-
-        Returns:
-            Rows (PV, stem), shape (K, p + m), and the samples ahead that they stand for,
-            shape (K,). The first row is the present estimate; without a plan it is alone.
-        """
-        return thinned_plan(self._controller, result, points)
 
     def _take(self, change: HandOver, controller: MpcController) -> None:
         """Let ``controller``, which has taken in the past, be the one in force."""

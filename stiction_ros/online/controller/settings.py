@@ -6,7 +6,7 @@ from stiction_ros.control import ControlMode
 from stiction_ros.control_settings import ControlSettings
 from stiction_ros.online.handover.offers import OfferRule
 from stiction_ros.online.handover.watch import WatchRule
-from stiction_ros.online.schedule import FitSchedule
+from stiction_ros.online.plain_settings import FitSchedule
 from stiction_ros.settings import setting
 
 AUTO = "auto"

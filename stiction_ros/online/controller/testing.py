@@ -12,7 +12,7 @@ from stiction_ros.identification.answer.step_answer import StepAnswer
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.controller.live import LiveController, ModeChange
 from stiction_ros.online.controller.settings import LiveControllerSettings
-from stiction_ros.online.handover.background import Background
+from stiction_ros.online.handover.hand_over import Background
 from stiction_ros.processes import LinearModel
 
 if TYPE_CHECKING:
@@ -41,7 +41,6 @@ class ValveTestingController(LiveController):
         model: LoopModel,
         background: Background | None = None,
     ) -> None:
-        """Build the first controller, as :class:`LiveController` does."""
         super().__init__(settings, model, background)
         self.test: ValveTest | None = None
         self.tested: ModeChange | None = None

@@ -25,7 +25,7 @@ from stiction_ros.online.estimator.friction_change import (
     narrowed,
 )
 from stiction_ros.online.estimator.trust import Trust, TrustedFriction, TrustRule, alike
-from stiction_ros.online.schedule import FitSchedule
+from stiction_ros.online.plain_settings import FitSchedule
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
 

@@ -111,7 +111,6 @@ class ValveTrust:
     """The state of the rule for one valve."""
 
     def __init__(self, rule: TrustRule) -> None:
-        """Start without trust."""
         self.rule = rule
         self.trusted: TrustedFriction | None = None
         self._pending: TrustedFriction | None = None
@@ -164,7 +163,6 @@ class Trust:
     """The rule for all valves of a loop."""
 
     def __init__(self, valves: Sequence[str], rule: TrustRule) -> None:
-        """Start without trust in any of ``valves``."""
         self._valves = {name: ValveTrust(rule) for name in valves}
 
     def retune(self, rule: TrustRule) -> None:

@@ -1,13 +1,110 @@
-"""A controller that is made ready beside the loop, to take over between two samples."""
+"""A controller that is made ready beside the loop on its past, to take over between two samples."""
 
 import dataclasses
-from concurrent.futures import Future
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
 
 from stiction_ros.control import History, MpcController
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.handover.background import Background
 from stiction_ros.online.handover.offers import Judge, Maker
-from stiction_ros.online.handover.past import Past
+
+T = TypeVar("T")
+
+
+class Background(Protocol):
+    """Runs what would make a step long: reading a model, building and judging a controller."""
+
+    ahead: bool  # whether work is begun as soon as it is known, or when its result is due
+
+    def submit(self, work: Callable[..., T], *arguments: Any) -> Future[T]:
+        """Return a future of ``work(*arguments)``; it may hold what the work raised."""
+        ...
+
+    def close(self) -> None:
+        """Drop what is queued and wait for what runs."""
+        ...
+
+
+class AtOnce:
+    """Does the work within the call, so that a run in lockstep does not depend on speed."""
+
+    ahead = False
+
+    def submit(self, work: Callable[..., T], *arguments: Any) -> Future[T]:
+        future: Future[T] = Future()
+        try:
+            future.set_result(work(*arguments))
+        except Exception as error:  # as an executor does: the future hands it on
+            future.set_exception(error)
+        return future
+
+    def close(self) -> None:
+        return
+
+
+class Beside:
+    """Does the work in one thread, in order, while the loop goes on."""
+
+    ahead = True
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix="beside")
+
+    def submit(self, work: Callable[..., T], *arguments: Any) -> Future[T]:
+        return self._pool.submit(work, *arguments)
+
+    def close(self) -> None:
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+class Past:
+    """The last ``limit`` samples: OP as it was applied, PV, measured disturbances.
+
+    Attributes:
+        count: samples added so far, those that are forgotten included.
+    """
+
+    def __init__(self, limit: int, valves: int, outputs: int, disturbances: int) -> None:
+        self.limit, self.count = limit, 0
+        self._op, self._pv, self._dv = (
+            np.zeros((2 * limit, width)) for width in (valves, outputs, disturbances)
+        )
+        self._first = self._end = 0
+
+    def __len__(self) -> int:
+        return self._end - self._first
+
+    def add(self, op: FloatArray, pv: FloatArray, dv: FloatArray) -> None:
+        """Add one sample: OP (m,), PV (p,), which is NaN where it is missing, and DV (d,)."""
+        if self._end == len(self._op):
+            for rows in (self._op, self._pv, self._dv):
+                rows[: self.limit] = rows[self.limit :]
+            self._first, self._end = self._first - self.limit, self.limit
+        for rows, values in ((self._op, op), (self._pv, pv), (self._dv, dv)):
+            rows[self._end] = values
+        self._end += 1
+        self._first = max(self._first, self._end - self.limit)
+        self.count += 1
+
+    def clear(self) -> None:
+        """Forget every sample; the count goes on."""
+        self._first = self._end = 0
+
+    def history(self) -> History:
+        """Return a copy of all that is remembered."""
+        return self._rows(self._first)
+
+    def since(self, count: int) -> History:
+        """Return a copy of the samples added after the first ``count`` of all."""
+        return self._rows(max(self._end - (self.count - count), self._first))
+
+    def _rows(self, first: int) -> History:
+        rows = slice(first, self._end)
+        return History(self._op[rows].copy(), self._pv[rows].copy(), self._dv[rows].copy())
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,10 +8,9 @@ from typing import TypeVar
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.online.input.applied_op import AppliedOp, Given
+from stiction_ros.online.input.op_port import AppliedOp, Given
 from stiction_ros.online.input.sample_grid import Pace, SampleGrid, Succession
-from stiction_ros.online.input.samples import PortRules, PortState, Sample
-from stiction_ros.online.input.set_point_preview import SetPointPreview
+from stiction_ros.online.input.samples import PortRules, PortState, Sample, SetPointPreview
 from stiction_ros.online.input.signal_check import SignalCheck
 
 T = TypeVar("T")

@@ -10,7 +10,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.controller.testing import ValveTestingController
-from stiction_ros.online.input.applied_op import Given
+from stiction_ros.online.input.op_port import Given
 from stiction_ros.online.input.port import LONGEST_GAP
 from stiction_ros.online.input.samples import Sample
 from stiction_ros.online.input.signal_check import SignalCheck

@@ -31,7 +31,6 @@ class Repair:
     # finished, or ``metadata.yaml`` was made anew; ``salvaged``: damaged records were left out
     status: RepairStatus
     files: tuple[str, ...]  # names of the storage files, in order
-    rewritten: tuple[str, ...]  # those that were rewritten
     messages: dict[str, int]  # messages by topic in the bag as it is now
     notes: tuple[str, ...]  # what was wrong, one sentence each
 
@@ -71,11 +70,7 @@ def repair_bag(path: str | Path, packing: finish.Packing = finish.Packing()) -> 
     if any(content.damaged for content in contents):
         status = RepairStatus.SALVAGED
     return Repair(
-        status,
-        tuple(file.name for file in files),
-        tuple(file.name for file, bad in zip(files, ill, strict=True) if bad),
-        dict(_counts(contents)),
-        (*notes, *listing),
+        status, tuple(file.name for file in files), dict(_counts(contents)), (*notes, *listing)
     )
 
 

@@ -5,34 +5,14 @@ So it survives splitting, cutting and conversion. While a bag grows each record 
 
 import struct
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import yaml
-
-from stiction_ros.records.storage.files import storage_files
-from stiction_ros.records.storage.mcap_scan import McapScan
 
 RUN = "stiction_run"  # name of the metadata records
 
 _LENGTH = struct.Struct("<I")
 _HEAD = 4  # bytes of the CDR encapsulation
-
-
-def run_metadata(path: str | Path) -> dict[str, str]:
-    """Return what the bag at ``path`` says of its run; empty when it says nothing.
-
-    Keys: ``config:/plant`` and so on with the text on ``~/config``; ``loop_model:/loop_model``
-    with the last text there; ``seed`` and ``version`` as the configurations give them;
-    ``recorder`` with the version that wrote the bag.
-    """
-    found: list[tuple[str, dict[str, str]]] = []
-    for file in storage_files(path):
-        scan = McapScan(file)
-        for _ in scan.messages():
-            pass
-        found += scan.metadata
-    return merged(found)
 
 
 def merged(records: Iterable[tuple[str, Mapping[str, str]]]) -> dict[str, str]:

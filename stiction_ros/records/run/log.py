@@ -12,8 +12,7 @@ from stiction_ros.records.bag.messages import BagMessage, MessageDecoder, read_r
 from stiction_ros.records.parts import joined, span
 from stiction_ros.records.record import Record
 from stiction_ros.records.run import events
-from stiction_ros.records.run.bag_reader import bag_source
-from stiction_ros.records.run.loop_runs import LoopRun, loop_runs
+from stiction_ros.records.run.loop_runs import LoopRun, bag_source, loop_runs
 from stiction_ros.records.run.loop_signals import LoopSignals, is_signal
 
 
@@ -76,7 +75,7 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
     """Read everything that a report needs from a bag, in one pass.
 
     Of several runs the longest is told, with a note on the others. Arguments and errors are those
-    of :func:`stiction_ros.records.run.bag_reader.read_bag_parts`.
+    of :func:`stiction_ros.records.run.loop_runs.read_bag_parts`.
     """
     notes: list[str] = []
     recorded: Counter[str] = Counter()

@@ -53,9 +53,6 @@ class Qos:
         return values
 
 
-LATCHED = Qos(depth=1, durability="transient_local")  # late joiners get the last message
-
-
 @dataclasses.dataclass(frozen=True)
 class BagTopic:
     """One topic of a bag."""

@@ -8,7 +8,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.pages.frame import text, words
 from stiction_ros.pages.plot import Curve, over_time
 from stiction_ros.pages.signals import Units, View, over_record
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 from stiction_ros.report.run.scoring import errors
 from stiction_ros.report.run.story import Story
 from stiction_ros.report.shapes import responses

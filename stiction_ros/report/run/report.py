@@ -1,15 +1,337 @@
-"""Writes the report of a run into its folder."""
+"""``report.html`` of a run: what was wrong, what the swap gained, then the evidence."""
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from stiction_ros.online.session import Scenario
-from stiction_ros.records.run.log import read_run
-from stiction_ros.report.page import page_file
-from stiction_ros.report.run.page import run_page
+from stiction_ros.pages.frame import framed, text, words
+from stiction_ros.pages.plot import SCRIPT
+from stiction_ros.records.run.events import ModeChange
+from stiction_ros.records.run.log import RunLog, read_run
+from stiction_ros.report.page import (
+    Cell,
+    count,
+    duration,
+    folded,
+    interval,
+    number,
+    page_file,
+    percent,
+    table,
+)
+from stiction_ros.report.run import identified
+from stiction_ros.report.run.figures import draw_run
+from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import Story, tell
-from stiction_ros.report.run.summary import summary, write_json
+from stiction_ros.report.run.summary import measured, messages, summary, work_rows, write_json
+
+_SCORES = (
+    ("amplitude", "amplitude of the cycle", ""),
+    ("offset", "offset", ""),
+    ("iae_per_hour", "IAE per hour", "·h/h"),
+)
+
+
+def run_page(story: Story) -> str:
+    """Return the report of a run as HTML."""
+    record = story.record
+    kicker = (
+        f"{len(record)} samples of {record.sample_time:g} s, "
+        f"{duration(len(record) * record.sample_time)} of operation"
+    )
+    if story.seed is not None:
+        kicker += f", seed {story.seed}"
+    parts = [
+        f"<h1>{text(headline(story))}</h1>",
+        f'<p class="soft">Loop {text(story.name)}: {text(kicker)}</p>',
+        _trouble(story),
+        *[f'<p class="lead">{words(line)}</p>' for line in findings(story)],
+        identified.valve_cards(story.identified.get("valves", []), story),
+        _gain(story),
+        _work(story),
+        *draw_run(story),
+        _fits(story),
+        monitor_section(story.log),
+        identified.process_table(story.identified.get("outputs", []), record.sample_time),
+        _messages(story),
+        _configuration(story),
+        _notes(story),
+    ]
+    return framed(f"{story.name}: {headline(story)}", parts, SCRIPT)
+
+
+def headline(story: Story) -> str:
+    """Return the answer in one line: which valve, and what became of it."""
+    verdicts = story.identified.get("valves", [])
+    line = identified.verdict_line(verdicts)
+    if not any(map(identified.has_friction, verdicts)):
+        return line
+    if story.log.swap is None:
+        return f"{line}; the controller was not swapped"
+    return f"{line}; the swap ended the limit cycle" if _gone(story) else f"{line}; swapped"
+
+
+def findings(story: Story) -> list[str]:
+    """Return the findings in a few sentences."""
+    lines = []
+    swap, found = story.log.swap, story.phases
+    if swap is not None:
+        known = [
+            f"{valve} f_S = {percent(swap.frictions[key])} % and "
+            f"f_D = {percent(swap.frictions.get(f'{valve}.f_d'))} %"
+            for valve in story.record.valves
+            if (key := f"{valve}.f_s") in swap.frictions
+        ]
+        with_known = f", on trusting for {'; for '.join(known)}" if known else ""
+        lines.append(
+            f"After {duration(story.swap_time)} the controller changed from unaware to "
+            f"{swap.mode} between two samples{with_known}."
+        )
+        lines += _later_changes(story, swap)
+    elif story.log.modes:
+        lines.append(f"The controller stayed {story.log.modes[-1].mode} throughout.")
+    if found.cycle is not None and found.status is PhaseStatus.OK:
+        period = duration(found.cycle.period * story.record.sample_time)
+        lines.append(f"Before, the loop cycled with a period of {period}. {_changes(story)}")
+    return lines
+
+
+def _later_changes(story: Story, swap: ModeChange) -> list[str]:
+    """Tell of changes of mode after the swap, such as a roll-back, and of new friction."""
+    lines, mode, renewed = [], swap.mode, 0
+    for change in story.log.modes:
+        if change.stamp <= swap.stamp:
+            continue
+        if change.mode == mode:
+            renewed += 1
+            continue
+        at, mode = duration(story.log.seconds(change.stamp)), change.mode
+        lines.append(f"After {at} it changed to {mode}: {change.reason}.")
+    if renewed:
+        times = {1: "once", 2: "twice"}.get(renewed, f"{renewed} times")
+        lines.append(f"Since the swap it has taken over new friction values {times}.")
+    return lines
+
+
+def _trouble(story: Story) -> str:
+    found = story.phases
+    stuck = any(map(identified.has_friction, story.identified.get("valves", [])))
+    if found.status is PhaseStatus.OK or (story.log.swap is None and not stuck):
+        return ""
+    return f'<p class="note warn">No comparison of before and after: {text(found.reason)}.</p>'
+
+
+def _gone(story: Story) -> bool:
+    """Tell whether every output's cycle has fallen below a fifth of what it was."""
+    ratios = [_ratio(story, name, "amplitude") for name in story.record.outputs]
+    return bool(ratios) and all(ratio is not None and ratio < 0.2 for ratio in ratios)
+
+
+def _ratio(story: Story, output: str, key: str) -> float | None:
+    before, after = story.phases.before, story.phases.after
+    if before is None or after is None:
+        return None
+    was, now = getattr(before.scores[output], key), getattr(after.scores[output], key)
+    return None if was is None or now is None or was <= 0 else float(now / was)
+
+
+def _changes(story: Story) -> str:
+    parts = []
+    for name in story.record.outputs:
+        ratio = _ratio(story, name, "amplitude")
+        if ratio is not None:
+            parts.append(f"of {name} to {100 * ratio:.0f} %")
+    return f"The swap took the amplitude {' and '.join(parts)} of what it was." if parts else ""
+
+
+def _gain(story: Story) -> str:
+    """Return the table of scores before, after and without friction."""
+    before, after, free = story.phases.before, story.phases.after, story.stiction_free
+    if before is None:
+        return ""
+    head = ["PV", "score", "before"]
+    if after is not None:
+        head += ["after", "after / before"]
+    if free is not None:
+        head += ["without friction", "after / without"]
+    rows: list[list[Cell]] = []
+    for name in story.record.outputs:
+        unit = story.units.get(name, "PV units")
+        for key, label, per in _SCORES:
+            was = getattr(before.scores[name], key)
+            row: list[Cell] = [name, f"{label}, {unit}{per}", number(was)]
+            now = None
+            if after is not None:
+                now = getattr(after.scores[name], key)
+                ratio = _ratio(story, name, key)
+                kind = "" if ratio is None else ("good" if ratio < 1 else "bad")
+                row += [number(now), (kind, "–" if ratio is None else f"{100 * ratio:.0f} %")]
+            if free is not None:
+                ideal = getattr(free.scores[name], key)
+                usable = now is not None and ideal is not None and ideal > 0
+                row += [number(ideal), f"{now / ideal:.2f}" if usable else "–"]
+            rows.append(row)
+    return (
+        ("<h2>What the swap gained</h2>" if after is not None else "<h2>How the loop does</h2>")
+        + table(head, rows, texts=2)
+        + f'<p class="soft">{text(_spans(story))}</p>'
+    )
+
+
+def _work(story: Story) -> str:
+    """Return the table of what the valves had to do before, after and without friction."""
+    found = story.phases
+    phases = {"before": found.before, "after": found.after, "without friction": story.stiction_free}
+    there = [name for name, phase in phases.items() if phase is not None]
+    if not there:
+        return ""
+    rows: list[list[Cell]] = [
+        [valve, label, *(number(value) for value in told)]
+        for valve, label, told in work_rows(measured(phases), there)
+    ]
+    return (
+        "<h2>What it asks of the valves</h2>"
+        + table(["valve", "", *there], rows, texts=2)
+        + '<p class="soft">Travel: way of the stem. Moves: samples at which it moves; without '
+        "friction it follows the noise. A dash: the stem is not known.</p>"
+    )
+
+
+def _spans(story: Story) -> str:
+    """Return which samples were compared and how the scores are defined."""
+    before, after = story.phases.before, story.phases.after
+    step = story.record.sample_time
+    said = []
+    for name, phase in (("Before", before), ("after", after)):
+        if phase is not None:
+            first, last = duration(phase.first * step), duration(phase.last * step)
+            said.append(f"{name}: {first if phase.first else 'start'} to {last}")
+    text_ = "; ".join(said) + "."
+    if after is not None and story.round_samples is None:
+        text_ += " The set-points do not repeat, so the two saw different moves."
+    if after is not None and story.round_samples is not None:
+        text_ += " Both are one whole round of the same set-point moves."
+    if story.stiction_free is not None:
+        text_ += (
+            " Without friction: the same plant with ideal valves under the controller of before,"
+            " same seed, same moves."
+        )
+    return text_ + (
+        " Amplitude: spectral line at the cycle's period inside the set-point holds. Offset:"
+        " |mean error| at the end of the holds. IAE per hour: mean |error| less the share of"
+        " known measurement noise."
+    )
+
+
+def _fits(story: Story) -> str:
+    """Return every fit of every valve, with the truth where it is known."""
+    log = story.log
+    if not log.fits:
+        return ""
+    rows: list[list[Cell]] = []
+    for fit in log.fits:
+        for valve in fit.identification.get("valves", []):
+            name, verdict = valve["name"], valve["verdict"]
+            trusted = [percent(fit.trusted.get(f"{name}.{key}")) for key in ("f_s", "f_d")]
+            rows.append(
+                [
+                    duration(log.seconds(fit.stamp)),
+                    name,
+                    (identified.KINDS.get(verdict, ""), verdict),
+                    percent(valve["f_s"]),
+                    interval(valve["f_s_interval"]),
+                    percent(valve["f_d"]),
+                    interval(valve["f_d_interval"]),
+                    " / ".join(trusted) if f"{name}.f_s" in fit.trusted else "–",
+                    count(fit.identification.get("samples")),
+                    number(fit.identification.get("seconds"), 2),
+                ]
+            )
+    head = (
+        "window ends",
+        "valve",
+        "verdict",
+        "f_S, %",
+        "interval",
+        "f_D, %",
+        "interval",
+        "trusted f_S / f_D",
+        "samples",
+        "fit took, s",
+    )
+    known = [
+        f"{valve} f_S = {percent(truth[0])} %, f_D = {percent(truth[1])} %"
+        for valve in story.record.valves
+        if (truth := story.true_friction(valve)) is not None
+    ]
+    said = f'<p class="soft">Simulated: {words("; ".join(known))}.</p>' if known else ""
+    return "<h2>Every fit</h2>" + table(head, rows, texts=3) + said
+
+
+def _messages(story: Story) -> str:
+    counts = messages(story.log.published, story.log.recorded)
+    if not counts:
+        return ""
+    rows: list[list[Cell]] = [
+        [topic, count(found["published"]), count(found["recorded"])]
+        for topic, found in counts.items()
+    ]
+    return (
+        "<h2>Messages</h2>"
+        + table(("topic", "published", "recorded"), rows)
+        + '<p class="soft">Published as the nodes count them in /diagnostics, whose last '
+        "message tells of itself and comes when the bag is closed. A dash: nobody counts.</p>"
+    )
+
+
+def _configuration(story: Story) -> str:
+    if not story.log.configs:
+        return ""
+    shown = [folded(config.topic, config.text) for config in story.log.configs]
+    shown += [
+        folded(f"{model.topic}, version {number}", model.text)
+        for number, model in enumerate(story.log.loop_models, start=1)
+    ]
+    return "<h2>Configuration</h2>" + "".join(shown)
+
+
+def _notes(story: Story) -> str:
+    notes = [*story.log.notes, *story.identified.get("model", {}).get("notes", [])]
+    if not notes:
+        return ""
+    return "<h2>Notes</h2><ul>" + "".join(f"<li>{text(note)}</li>" for note in notes) + "</ul>"
+
+
+def monitor_section(log: RunLog) -> str:
+    """Return every measurement of the gap with what was found; empty without a monitor."""
+    looks = log.gaps.looks
+    if not looks:
+        return ""
+    rows: list[list[Cell]] = []
+    for stamp, look in looks.items():
+        found = log.gaps.findings.get(stamp, {})
+        outputs = look.get("outputs", {})
+        rows.append(
+            [
+                duration(log.seconds(stamp)),
+                ("bad", "grown") if look.get("grown") else "as in the baseline",
+                str(found.get("text", "")) or str(look.get("failure", "")),
+                ", ".join(f"{name} {_growth(one)}" for name, one in outputs.items()),
+            ]
+        )
+    grown = sum(bool(look.get("grown")) for look in looks.values())
+    said = f"The gap between loop and model was measured {len(looks)} times; "
+    said += f"in {grown} of them it had grown." if grown else "it never grew."
+    head = ("window ends", "gap", "found", "times the baseline’s (limit)")
+    return f"<h2>The monitor</h2><p>{words(said)}</p>" + table(head, rows, texts=3)
+
+
+def _growth(look: Mapping[str, Any]) -> str:
+    gap, baseline, limit = (look.get(key) for key in ("gap", "baseline", "limit"))
+    share = gap / baseline if isinstance(gap, float) and baseline else None
+    return f"{number(share)} ({number(limit)})"
 
 
 @dataclasses.dataclass(frozen=True)

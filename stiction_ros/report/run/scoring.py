@@ -19,7 +19,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records import Record
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 from stiction_ros.records.valve_work import ValveWork, largest_op_step, work_per_hour
 from stiction_ros.signals import oscillation
 from stiction_ros.signals.holds import holds

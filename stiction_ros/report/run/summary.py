@@ -1,12 +1,19 @@
 """``summary.json`` of a run: the figures that acceptance looks at."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from stiction_ros.report.run.scoring import Phase
 from stiction_ros.report.run.story import Story
 from stiction_ros.texts import finite, json_text
+
+KEYS = (
+    ("travel", "travel, %/h"),
+    ("moves", "moves/h"),
+    ("reversals", "reversals/h"),
+    ("op_step", "largest OP step, %"),
+)
 
 
 def summary(
@@ -74,3 +81,22 @@ def messages(
 def write_json(value: Mapping[str, Any], path: str | Path) -> None:
     """Write ``value`` as JSON that every reader takes."""
     Path(path).write_text(json_text(value) + "\n", encoding="utf-8")
+
+
+def work_rows(
+    summary: Mapping[str, Any], phases: Sequence[str]
+) -> list[tuple[str, str, list[float | None]]]:
+    """Return rows of a valve, a measure and its value in each of ``phases``; None if unknown."""
+    steps, work = summary["largest_op_step"], summary["valve_work"]
+    valves = next((list(steps[name]) for name in phases if name in steps), [])
+    rows = []
+    for valve in valves:
+        for key, label in KEYS:
+            told = [
+                steps.get(name, {}).get(valve)
+                if key == "op_step"
+                else work.get(name, {}).get(valve, {}).get(key)
+                for name in phases
+            ]
+            rows.append((valve, label, told))
+    return rows

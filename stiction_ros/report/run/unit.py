@@ -12,7 +12,7 @@ from stiction_ros.records.run.log import read_run
 from stiction_ros.report.page import Cell, duration, number, page_file, table
 from stiction_ros.report.run.figures import whole_run
 from stiction_ros.report.run.identified import KINDS, valve_cards
-from stiction_ros.report.run.page import findings
+from stiction_ros.report.run.report import findings
 from stiction_ros.report.run.scoring import Phase, PhaseStatus, errors, phases
 from stiction_ros.report.run.story import Story, tell
 from stiction_ros.report.run.summary import summary, write_json

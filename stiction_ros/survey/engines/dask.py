@@ -10,7 +10,7 @@ from typing import Any
 from stiction_ros.errors import InputError
 from stiction_ros.survey.assess import Assessed, assess
 from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Task, lost
-from stiction_ros.survey.survey_options import SurveyOptions
+from stiction_ros.survey.entry import SurveyOptions
 
 SCHEME = "dask://"
 

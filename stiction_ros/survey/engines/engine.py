@@ -6,8 +6,7 @@ from typing import Protocol
 
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.assess import Assessed
-from stiction_ros.survey.entry import Entry, Status
-from stiction_ros.survey.survey_options import SurveyOptions
+from stiction_ros.survey.entry import Entry, Status, SurveyOptions
 
 ATTEMPTS = 3  # times that a loop is tried whose worker dies: it may kill workers
 

@@ -24,7 +24,7 @@ from stiction_ros.intake.loop import Loop
 from stiction_ros.orphans import spared
 from stiction_ros.survey.assess import Assessed, assess
 from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Task, lost
-from stiction_ros.survey.survey_options import SurveyOptions
+from stiction_ros.survey.entry import SurveyOptions
 
 LONGEST = 600.0  # seconds that one loop may take; a usual one takes a second or two
 READY = "ready"  # what a worker says once, before its first loop

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from stiction_ros.pages.frame import text
 from stiction_ros.survey.entry import Entry, Status
-from stiction_ros.survey.listing.headline import kind_of
-from stiction_ros.survey.listing.saved import HEADS, change, in_words, note_of
+from stiction_ros.survey.listing.headline import HEADS, change, in_words, kind_of, note_of
 from stiction_ros.survey.pages import words as say
 from stiction_ros.survey.pages.trend import Earlier, Trend, trend_of, widest
 from stiction_ros.texts import probability

@@ -1,13 +1,35 @@
 """What a survey found in a sentence or two, alike on page and console."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.pages.trend import Earlier, new_and_gone
-from stiction_ros.survey.pages.words import period
+from stiction_ros.survey.pages.words import period, signed_percent
 from stiction_ros.survey.survey import Survey
 
 NAMED = 8  # loops that a sentence lists
+HEADS = {
+    "service": "|PV−SP| after service",
+    "embedding": "|PV−SP| with friction known",
+    "retune": "|PV−SP| after retuning",
+}
+"""Heading of each thing that may be done, wherever people read it."""
+
+WHY = (
+    ("do not agree", "draws disagree"),
+    ("repeat the record", "does not repeat"),
+    ("times as fast", "faster than shown"),
+    ("Not simulated", "not simulated"),
+    ("grows without end", "unstable"),
+    ("No other tuning", "none helps"),
+    ("another tuning is not looked for", "not looked for"),
+    ("Nothing is promised", "valve makes no cycle"),
+    ("cannot be set up", "cannot be set up"),
+)
+"""What a note of ``gain`` says, and that in a word or two; the first that fits."""
+
+NOTHING = -0.005  # change from which up another tuning is none that helps
 
 
 def headline(survey: Survey) -> str:
@@ -51,3 +73,39 @@ def loops(count: int) -> str:
 def _listed(names: Sequence[str]) -> str:
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return ", ".join(names[:NAMED]) + more
+
+
+def change(entry: Entry, what: str) -> float | None:
+    """Return what an option changes of the mean |PV − SP|: −.75 leaves a quarter of it."""
+    gain = entry.gain or {}
+    before = _of(gain, "now").get("iae_per_hour")
+    after = _of(gain, what).get("iae_per_hour")
+    if not before or after is None:
+        return None
+    return float(after) / float(before) - 1.0
+
+
+def in_words(entry: Entry, what: str) -> str:
+    """Return the change, or why there is none; nothing for a valve that needs nothing."""
+    if not entry.found:
+        return ""
+    changed, note = change(entry, what), note_of(entry, what)
+    if changed is None:
+        return _short(note) or "not simulated"
+    if what == "retune" and changed >= NOTHING:
+        return _short(note) or "none helps"
+    return signed_percent(changed)
+
+
+def note_of(entry: Entry, what: str) -> str:
+    """Return what ``gain`` says of an option; empty where it was not asked."""
+    return str(_of(entry.gain or {}, what).get("note", ""))
+
+
+def _short(note: str) -> str:
+    return next((word for said, word in WHY if said in note), "")
+
+
+def _of(gain: Mapping[str, Any], what: str) -> Mapping[str, Any]:
+    found = gain.get(what)
+    return found if isinstance(found, Mapping) else {}

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 from stiction_ros.survey.entry import Entry, Status
-from stiction_ros.survey.listing.saved import HEADS, change
+from stiction_ros.survey.listing.headline import HEADS, change
 from stiction_ros.survey.pages.words import cause_words
 
 Cell = str | float | int | None

@@ -4,8 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.records.quality import Quality, QualityArray
-from stiction_ros.records.record import Gap, Record
+from stiction_ros.records.record import Gap, Quality, QualityArray, Record
 from stiction_studies.field.circumstances import UNITS, Circumstances, Friction, Hole, Keeping, Unit
 from stiction_studies.field.drawing import Made
 from stiction_studies.field.kernels import FlagArray, FloatArray

@@ -13,7 +13,7 @@ from stiction_ros.discrepancy.data.scans import scanned_twice
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray, HeStiction
 from stiction_ros.loop import LoopModel, PiTuning
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 
 EVERY = 2
 TUNING = PiTuning(gain=0.8, integral_time=24.0)

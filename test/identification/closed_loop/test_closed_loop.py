@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 from known_loops import Kind, Known, changed, known
 
 from stiction_ros.identification.closed_loop.closed_loop import ClosedLoop, close_loop
-from stiction_ros.loop.damping import ringing
-from stiction_ros.loop.linear_loops import Process
+from stiction_ros.loop.linear_loops import Process, ringing
 
 STICKY = Kind(friction=(3.0, 1.0))
 

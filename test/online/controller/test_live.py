@@ -19,6 +19,7 @@ from stiction_ros.effects import (
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints, ValveChange
 from stiction_ros.online.controller.live import LiveController
+from stiction_ros.online.controller.making import thinned_plan
 from stiction_ros.online.controller.settings import LiveControllerSettings
 
 PLANT = LoopModel.load(find_config("example1.loop.yaml"))
@@ -713,9 +714,9 @@ def test_the_prediction_of_an_older_plan_begins_now() -> None:
     run = Run(LiveController(SETTINGS, PROCESS))
     run.go(60)
     solved = run.live.step(np.array([50.0]), np.array([53.0]))
-    before, _ = run.live.prediction(solved, 200)
+    before, _ = thinned_plan(run.live.observed, solved, 200)
     shifted = run.live.step(np.array([np.nan]), np.array([53.0]))
-    rows, picks = run.live.prediction(shifted, 200)
+    rows, picks = thinned_plan(run.live.observed, shifted, 200)
     assert shifted.age == 1
     assert picks[-1] == len(before) - 2
     assert rows[1:, 0] == pytest.approx(before[2:, 0])

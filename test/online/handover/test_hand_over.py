@@ -2,6 +2,8 @@ import functools
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlMode, MpcController
@@ -9,9 +11,7 @@ from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.handover.background import AtOnce, Beside
-from stiction_ros.online.handover.hand_over import HandOver
-from stiction_ros.online.handover.past import Past
+from stiction_ros.online.handover.hand_over import AtOnce, Beside, HandOver, Past
 
 PROCESS = LoopModel.load(find_config("example1_process.loop.yaml"))
 DESIGN = ControlSettings(hand_over_samples=60).design(PROCESS)
@@ -76,3 +76,35 @@ def test_a_past_without_any_measurement_can_be_taken_over() -> None:
     found = change.take(past).controller
     assert found is not None
     assert np.isfinite(found.observer.state).all()
+
+
+@given(limit=st.integers(1, 9), samples=st.integers(0, 60), late=st.integers(0, 12))
+def test_it_holds_the_last_samples_in_order(limit: int, samples: int, late: int) -> None:
+    past = Past(limit, 1, 2, 0)
+    for k in range(samples):
+        past.add(np.array([k]), np.array([k, -k]), np.zeros(0))
+    expected = list(range(max(samples - limit, 0), samples))
+    assert past.count == samples
+    assert len(past) == len(expected)
+    assert past.history().op[:, 0].tolist() == expected
+    assert past.history().pv[:, 1].tolist() == [-k for k in expected]
+    since = max(samples - late, 0)
+    assert past.since(since).op[:, 0].tolist() == [k for k in expected if k >= since]
+
+
+def test_what_is_cleared_is_forgotten_and_the_count_goes_on() -> None:
+    past = Past(3, 1, 1, 0)
+    for k in range(5):
+        past.add(np.array([k]), np.array([k]), np.zeros(0))
+    past.clear()
+    past.add(np.array([9.0]), np.array([9.0]), np.zeros(0))
+    assert past.history().op.tolist() == [[9.0]]
+    assert past.since(0).op.tolist() == [[9.0]]
+    assert past.count == 6
+
+
+def test_a_history_is_a_copy() -> None:
+    past = Past(3, 1, 1, 0)
+    past.add(np.zeros(1), np.zeros(1), np.zeros(0))
+    past.history().op[:] = 7.0
+    assert past.history().op.tolist() == [[0.0]]

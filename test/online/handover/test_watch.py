@@ -1,9 +1,12 @@
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from stiction_ros.online.handover.watch import Watch, WatchRule
+from stiction_ros.online.handover.watch import Approach, Watch, WatchRule
 
 RULE = WatchRule(watch_samples=20, watch_settle=5, watch_ratio=1.5, watch_failures=3)
+VALUES = st.floats(-1e3, 1e3)
 
 
 def feed(watch: Watch, error: float, samples: int, sp: float = 0.0, failed: bool = False) -> str:
@@ -142,3 +145,23 @@ def test_samples_behind_a_disturbance_are_left_out() -> None:
     for _ in range(20):
         watch.disturb()
         assert feed(watch, 9.0, RULE.watch_settle) == ""
+
+
+@given(pv=VALUES, sp=VALUES, samples=st.integers(0, 30))
+def test_it_goes_from_pv_to_the_set_point_in_equal_steps(
+    pv: float, sp: float, samples: int
+) -> None:
+    approach, aims = Approach(np.array([pv]), np.array([sp]), samples), [pv]
+    while not approach.over:
+        aims.append(float(approach.aim(np.array([sp]))[0]))
+    assert len(aims) == samples + 1
+    assert approach.aim(np.array([sp])).tolist() == [sp]
+    assert np.diff([*aims, sp]) == pytest.approx(
+        [(sp - pv) / (samples + 1)] * (samples + 1), abs=1e-9
+    )
+
+
+def test_a_set_point_that_moves_on_the_way_moves_the_aim() -> None:
+    approach = Approach(np.array([0.0]), np.array([10.0]), 4)
+    approach.aim(np.array([10.0]))
+    assert approach.aim(np.array([20.0])).tolist() == [14.0]

@@ -5,11 +5,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
+from stiction_ros.online.input.op_port import (
+    KEPT,
+    SILENT,
+    AppliedOp,
+    CommandRules,
+    OpPort,
+    Reception,
+)
 
 SECOND = 10**9
 ME, OTHER = "/controller", "/stranger"
 OP = np.array([50.0])
+STEP = 10
+A, B = np.array([40.0]), np.array([60.0])
 
 
 def port(commander: str = ME, *, exact: bool = False) -> OpPort:
@@ -73,3 +82,45 @@ def test_no_junk_stops_the_op_of_the_sample_to_come(junk):
     for sender, stamp in junk:
         judge.judge(sender, stamp, OP, 10 * SECOND)
     assert judge.judge(ME, 12 * SECOND, OP, 12 * SECOND) is Reception.TAKEN
+
+
+def test_what_was_given_belongs_to_the_sample_before() -> None:
+    told = AppliedOp(STEP)
+    told.add(100, A)
+    told.add(110, B)
+    assert told.before(110, True).op is A
+    assert told.before(120, True).op is B
+
+
+def test_where_nobody_tells_the_own_op_counts_if_it_was_in_time() -> None:
+    told = AppliedOp(STEP)
+    for in_time in (True, False):
+        given = told.before(100, in_time)
+        assert (given.op, given.known) == (None, in_time)
+
+
+def test_where_someone_tells_a_message_that_lacks_leaves_it_unknown_for_a_while() -> None:
+    told = AppliedOp(STEP)
+    told.add(100, A)
+    told.before(110, True)
+    known = [told.before(110 + STEP * k, True).known for k in range(1, SILENT + 3)]
+    assert known == [False] * (SILENT - 1) + [True] * 3
+
+
+def test_the_op_in_force_is_the_newest_before_the_sample() -> None:
+    told = AppliedOp(STEP)
+    assert told.in_force(100) is None
+    told.add(80, A)
+    told.add(90, B)
+    told.add(100, A)
+    assert told.in_force(100) is B
+    assert told.in_force(100 + 100 * STEP) is None
+
+
+def test_what_belongs_to_no_sample_does_not_pile_up() -> None:
+    told = AppliedOp(STEP)
+    for k in range(3 * KEPT):
+        told.add(10**9 + k, A)
+    told.add(90, B)
+    assert len(told._told) == KEPT
+    assert told.before(100, True).op is B

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from stiction_ros.loop import Instrument
 from stiction_ros.online.input.port import PATIENCE, InputPort
 from stiction_ros.online.input.sample_grid import SUCCESSION
-from stiction_ros.online.input.samples import PortRules, Sample
-from stiction_ros.online.input.set_point_preview import SetPointPreview
+from stiction_ros.online.input.samples import PortRules, Sample, SetPointPreview
 
 S = 10**9
 NAN = float("nan")

@@ -1,14 +1,8 @@
 import pytest
+from as_given import run_metadata
 from bag_making import Bag, text
 
-from stiction_ros.records.bag.run_metadata import (
-    custom_data,
-    mapping_of,
-    merged,
-    news,
-    run_metadata,
-    string_of,
-)
+from stiction_ros.records.bag.run_metadata import custom_data, mapping_of, merged, news, string_of
 from stiction_ros.records.storage.mcap_scan import McapScan
 
 STRING = "std_msgs/msg/String"

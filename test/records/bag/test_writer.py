@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from bag_making import JOINT_STATE, SECOND, Bag, clock, joint_state
+from bag_making import JOINT_STATE, LATCHED, SECOND, Bag, clock, joint_state
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
@@ -21,7 +21,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.bag.finish import finish_bag
 from stiction_ros.records.bag.messages import read_messages, read_raw
 from stiction_ros.records.bag.writer import BagWriter, Packing
-from stiction_ros.records.storage.bag_metadata import LATCHED, Qos
+from stiction_ros.records.storage.bag_metadata import Qos
 
 
 def filled(bag: Bag) -> Path:

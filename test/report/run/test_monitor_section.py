@@ -5,8 +5,7 @@ import pytest
 
 from stiction_ros.records.run.events import GapLog
 from stiction_ros.records.run.log import RunLog
-from stiction_ros.report.run.page import monitor_section
-from stiction_ros.report.run.report import write_run
+from stiction_ros.report.run.report import monitor_section, write_run
 from stiction_ros.report.run.story import tell
 
 SECOND = 10**9

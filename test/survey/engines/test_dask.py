@@ -13,8 +13,8 @@ from made import unreadable
 from stiction_ros.errors import InputError
 from stiction_ros.survey.engines.dask import DaskEngine
 from stiction_ros.survey.engines.engine import Task
+from stiction_ros.survey.entry import SurveyOptions
 from stiction_ros.survey.survey import Plan, survey
-from stiction_ros.survey.survey_options import SurveyOptions
 
 distributed = pytest.importorskip("distributed")
 

@@ -11,8 +11,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.engines.engine import Task
 from stiction_ros.survey.engines.local import LocalEngine
-from stiction_ros.survey.entry import Status
-from stiction_ros.survey.survey_options import SurveyOptions
+from stiction_ros.survey.entry import Status, SurveyOptions
 
 OPTIONS = SurveyOptions(pages=False)
 

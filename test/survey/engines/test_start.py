@@ -15,7 +15,7 @@ sys.path.append({made!r})
 from made import unreadable
 from stiction_ros.survey.engines.engine import Task
 from stiction_ros.survey.engines.local import LocalEngine
-from stiction_ros.survey.survey_options import SurveyOptions
+from stiction_ros.survey.entry import SurveyOptions
 if __name__ == "__main__":
     for done in LocalEngine(1).run([Task("1", unreadable(1))], SurveyOptions(pages=False)):
         print(done.assessed.entry.reason)

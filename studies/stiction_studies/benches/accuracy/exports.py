@@ -15,7 +15,7 @@ from rich.console import Console
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.errors import InputError
 from stiction_ros.intake import IntakeOptions, Loop, loops
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 from stiction_studies.benches.accuracy.share import Share, shares_table
 from stiction_studies.field.exports.random_export import Export, write_random_export
 from stiction_studies.seeds import run_seeds

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import read_messages, stamp_ns
-from stiction_ros.records.run.bag_reader import read_bag_parts
+from stiction_ros.records.run.loop_runs import read_bag_parts
 from stiction_studies.faults.observation import BagFound, Sampled
 
 COMPARED = ("pv", "op_applied")

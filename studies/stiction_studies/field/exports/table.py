@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Quality
 from stiction_studies.field.field_loop import FieldLoop
 from stiction_studies.field.kernels import FloatArray
 

@@ -16,8 +16,8 @@ from stiction_ros.discrepancy import (
 )
 from stiction_ros.effects import from_mapping
 from stiction_ros.loop import LoopModel, SetPoints, simulate
-from stiction_ros.report.gap.report import WINDOW, _liveliest, report_gap
-from stiction_ros.report.gap.words import figures_with_units
+from stiction_ros.report.gap_page import WINDOW, _liveliest, report_gap
+from stiction_ros.report.gap_words import figures_with_units
 
 
 def discrepancy(place: str, **effect: object) -> Discrepancy:

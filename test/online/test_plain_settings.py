@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.online.schedule import FitSchedule
+from stiction_ros.online.plain_settings import FitSchedule
 
 schedules = st.builds(FitSchedule, st.integers(1, 50), st.integers(1, 50), st.integers(1, 50))
 

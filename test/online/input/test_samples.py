@@ -1,6 +1,6 @@
 import numpy as np
 
-from stiction_ros.online.input.set_point_preview import SetPointPreview
+from stiction_ros.online.input.samples import SetPointPreview
 
 ONE = np.array([1.0])
 STEP = 10

@@ -21,10 +21,10 @@ from stiction_ros.nodes.shared.messages import rows_of, to_ns, values_of
 from stiction_ros.nodes.shared.peers import PLANTS
 from stiction_ros.nodes.shared.typed import quality
 from stiction_ros.online.controller.testing import ValveTestingController
-from stiction_ros.online.handover.background import Background
-from stiction_ros.online.handover.offered_model import read_offer
+from stiction_ros.online.handover.hand_over import Background
+from stiction_ros.online.handover.known_friction import read_offer
 from stiction_ros.online.input.port import InputPort
-from stiction_ros.online.input.set_point_preview import SetPointPreview
+from stiction_ros.online.input.samples import SetPointPreview
 from stiction_ros.online.node_settings import ControllerNodeSettings
 
 # What is read to the end before a step, in this order.

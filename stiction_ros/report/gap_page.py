@@ -13,7 +13,7 @@ from stiction_ros.discrepancy.gap.measure import levelled
 from stiction_ros.effects import FloatArray
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import KINDS, SCRIPT, Curve, against, over_time
-from stiction_ros.report.gap import words as say
+from stiction_ros.report import gap_words as say
 from stiction_ros.report.page import Cell, card, folded, number, table
 from stiction_ros.signals.holds import stretches
 

@@ -15,7 +15,7 @@ from stiction_ros.identification.result import (
     ValveEstimate,
 )
 from stiction_ros.records.record import Record
-from stiction_ros.report.record.report import lead, work_table
+from stiction_ros.report.record_page import lead, work_table
 
 PERIOD, SAMPLES, STEP = 40.0, 1000, 2.0
 

@@ -1,1 +1,0 @@
-"""Topics of a loop between the graph and what decides on them."""
