@@ -8,8 +8,7 @@ import numpy as np
 
 from stiction_ros.checks import of_kind, one_of
 from stiction_ros.control.belief import ValveBeliefs
-from stiction_ros.control.design import ControlDesign, History
-from stiction_ros.control.modes import formulation_of
+from stiction_ros.control.design import ControlDesign, History, formulation_of
 from stiction_ros.control.observer import Observer
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
 from stiction_ros.control.slip_check import Passage, SlipCheck

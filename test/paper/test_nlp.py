@@ -14,10 +14,14 @@ from stiction_ros.identification import FitStatus, Identification, VerdictKind
 from stiction_ros.paper.methods import identify
 from stiction_ros.paper.one_step_result import fit_outputs
 from stiction_ros.paper.paper_options import PaperOptions
-from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme
 from stiction_ros.paper.programme.programme_data import ProgrammeData
-from stiction_ros.paper.programme.reduced_programme import ALPHA, ReducedProgramme
+from stiction_ros.paper.programme.reduced_programme import (
+    ALPHA,
+    Criterion,
+    ReducedProgramme,
+    StemTable,
+)
 from stiction_ros.paper.programme.starts import (
     StartKind,
     apparent_stictions,

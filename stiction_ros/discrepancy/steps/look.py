@@ -39,8 +39,8 @@ from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.process.refit import open_figures, refitted_behind
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
-from stiction_ros.discrepancy.steps.mending import changed_again, made_room, process_first
 from stiction_ros.discrepancy.steps.state import State, Task
+from stiction_ros.discrepancy.steps.wholes import changed_again, made_room, process_first
 from stiction_ros.loop import LoopModel
 
 TURNS = 2  # in which a fitted process and the effects before it are fitted again

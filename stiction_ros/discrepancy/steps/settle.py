@@ -14,9 +14,8 @@ from stiction_ros.discrepancy.decision.decide import (
 from stiction_ros.discrepancy.decision.extend import AddedEffect, refit_together, told_already
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.steps.look import look_on, scored_by
-from stiction_ros.discrepancy.steps.mending import mended, singles
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import Keys, best_whole, whole
+from stiction_ros.discrepancy.steps.wholes import Keys, best_whole, mended, singles, whole
 from stiction_ros.effects import Backlash, about
 
 APART = 5.0  # samples between a step and its opposite that are outliers together

@@ -20,10 +20,14 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper import one_step_result as one_step
 from stiction_ros.paper.paper_options import PaperOptions
-from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme, Solution
 from stiction_ros.paper.programme.programme_data import ProgrammeData
-from stiction_ros.paper.programme.reduced_programme import ReducedProgramme, ReducedSolution
+from stiction_ros.paper.programme.reduced_programme import (
+    Criterion,
+    ReducedProgramme,
+    ReducedSolution,
+    StemTable,
+)
 from stiction_ros.paper.programme.starts import (
     Start,
     StartKind,

@@ -4,11 +4,10 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper.one_step_result import check_record, fit_outputs, friction_limits
-from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme
 from stiction_ros.paper.programme.nlp import WIDTH
 from stiction_ros.paper.programme.programme_data import ProgrammeData
-from stiction_ros.paper.programme.reduced_programme import ReducedProgramme
+from stiction_ros.paper.programme.reduced_programme import Criterion, ReducedProgramme, StemTable
 from stiction_ros.paper.smoothed_laws import final_smoothing, smooth_law
 from stiction_studies.examples import Example
 from stiction_studies.paper.exhibit import Exhibit, Row
