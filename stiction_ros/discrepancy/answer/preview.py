@@ -68,8 +68,11 @@ def preview(found: Discrepancy) -> Preview | None:
     op = _moves(model, j, rivals)
     shown = []
     for (place, effect), behaviour in rivals.items():
+        values = behaviour.to_mapping()
         try:
-            altered = model.with_effect(place, _soon(behaviour, model.sample_time))
+            if "time" in values:  # inside the experiment
+                behaviour = from_mapping(values | {"time": HOLD * model.sample_time})
+            altered = model.with_effect(place, behaviour)
         except InputError:
             continue  # what changes the record alone has nothing to show in the plant
         run = simulate_open_loop(altered, op, 0)
@@ -108,14 +111,6 @@ def _fitted(found: Discrepancy, key: Name) -> dict[Name, Behaviour]:
                 behaviour = fit.behaviour(look.scores.base.run)
                 return {} if behaviour is None else {key: behaviour}
     return {}
-
-
-def _soon(behaviour: Behaviour, step: float) -> Behaviour:
-    """Return the effect with its moment inside the experiment."""
-    values = behaviour.to_mapping()
-    if "time" not in values:
-        return behaviour
-    return from_mapping(values | {"time": HOLD * step})
 
 
 def _moves(model: LoopModel, valve: int, rivals: Mapping[Name, Behaviour]) -> FloatArray:

@@ -45,11 +45,6 @@ class Response:
             None if self.possible is None else self.possible[point : point + 1],
         )
 
-    @property
-    def impossible(self) -> bool:
-        """Whether no point is possible."""
-        return self.possible is not None and not self.possible.any()
-
 
 class Identity(NamedTuple):
     """Which change of a model a candidate is, whatever its figures and the model behind it."""

@@ -126,7 +126,7 @@ class SineWave(LineWave):
     @classmethod
     def of(cls, run: FreeRun, lines: FloatArray) -> Self:
         """Return the sine as it is searched in a record."""
-        length = length_of(run)
+        length = run.runs.longest.stop - run.runs.longest.start
         return cls(
             axes=(_frequencies(1.0 / length),),
             sample_time=run.runs.sample_time,
@@ -167,7 +167,7 @@ class ShapedWave(LineWave):
         cls, run: FreeRun, lines: FloatArray, kind: type[SquareDisturbance | TriangleDisturbance]
     ) -> Self:
         """Return the wave as it is searched in a record."""
-        length = length_of(run)
+        length = run.runs.longest.stop - run.runs.longest.start
         phases = Axis(-0.5, 1.0, 3 * PHASES + 1, natural=True)
         return cls(
             effect=kind.effect,
@@ -207,12 +207,6 @@ class ShapedWave(LineWave):
         phase = _TURN * (begun + (0.5 if size < 0.0 else 0.0))
         turned = math.remainder(phase, _TURN)
         return self.kind(abs(size), self.sample_time / float(point[0]), turned)
-
-
-def length_of(run: FreeRun) -> int:
-    """Return the samples of the longest record."""
-    rows = run.runs.longest
-    return int(rows.stop - rows.start)
 
 
 def _frequencies(width: float, fastest: float = FASTEST) -> Axis:

@@ -85,7 +85,9 @@ def decide(
     stranger = outside[0] if outside else None
     sure = bool(passed) and passed[0].evidence >= margin + SURE
     refused = passed[0] if sure and not confirmed(passed[0]) else None
-    lent = refused if stranger is None or _beats(refused, stranger) else None
+    lent = refused
+    if refused is not None and stranger is not None and refused.evidence <= stranger.evidence:
+        lent = None
     if not kept:
         if stranger is not None and stranger.evidence >= 2.0 * margin:
             return _unknown(stranger, "nothing in the catalogue explains the gap", lent)
@@ -122,7 +124,11 @@ def decide(
         names += [twin for twin in rival.candidate.twins if twin not in names]
     if names:
         reason = "OP and PV do not tell them apart"
-        one_family = all((_lags(f) and _lags(best)) or _as_well(f, best) for f in rivals)
+        one_family = all(  # or the same effect at another place explains all, as a sine's load does
+            (_lags(f) and _lags(best))
+            or (f.candidate.effect == best.candidate.effect and _as_much(f, best))
+            for f in rivals
+        )
         return Decision(GapVerdict.AMBIGUOUS, best, tuple(names), one_family, reason)
     return Decision(GapVerdict.NAMED, best, (), True, "it beats no effect and its rivals")
 
@@ -185,10 +191,6 @@ def _would_explain(fit: CandidateFit) -> str:
     return f"{fit.candidate.name} would explain the gap by {fit.evidence:.0f}"
 
 
-def _beats(fit: CandidateFit | None, other: CandidateFit) -> bool:
-    return fit is not None and fit.evidence > other.evidence
-
-
 def _part(fit: CandidateFit, stranger: CandidateFit) -> bool:
     """Tell whether a fit is most of what a rival outside the catalogue contains."""
     part = fit.candidate.key in stranger.candidate.contains
@@ -205,11 +207,6 @@ def _apart(fit: CandidateFit, best: CandidateFit, margin: float) -> float:
 
 def _lags(fit: CandidateFit) -> bool:
     return fit.candidate.about.family == LAGS
-
-
-def _as_well(fit: CandidateFit, best: CandidateFit) -> bool:
-    """Tell whether the same effect at another place explains all of it, as a sine's load does."""
-    return fit.candidate.effect == best.candidate.effect and _as_much(fit, best)
 
 
 def _as_much(fit: CandidateFit, best: CandidateFit) -> bool:

@@ -140,12 +140,9 @@ def reference_point(base: Baseline, candidate: Candidate) -> FloatArray:
     given = (*figures, *(0.0,) * len(candidate.axes))
     axes = zip(given, candidate.axes, strict=False)
     point = np.array([[float(np.clip(v, axis.low, axis.high)) for v, axis in axes]])
-    return point if candidate.possible(point).all() else _nearest_possible(candidate, point)
-
-
-def _nearest_possible(candidate: Candidate, point: FloatArray) -> FloatArray:
-    """Return the possible point of the first grid that is nearest, in its steps, (1, axes)."""
-    grid = candidate.grid()
+    if candidate.possible(point).all():
+        return point
+    grid = candidate.grid()  # the possible point of it that is nearest, in its steps
     grid = grid[candidate.possible(candidate.values(grid))]
     steps = np.array([max(axis.spacing, 1e-300) for axis in candidate.axes])
     away = (grid - candidate.coordinates(point[0])) / steps

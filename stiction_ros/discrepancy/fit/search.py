@@ -328,7 +328,7 @@ class _Search:
 
     def _fit(self, values: FloatArray, response: Response, rounded: bool) -> CandidateFit:
         factors = np.zeros(0)
-        if response.impossible:
+        if response.possible is not None and not response.possible.any():  # no point is
             unmoved = {i: self.base.noise[i] for i in response.outputs}
             return CandidateFit(self.candidate, values, factors, unmoved, -np.inf, 0.0)
         noise = {i: self._noise(i, response, values, None, rounded) for i in response.outputs}

@@ -130,11 +130,6 @@ class Agreement:
     # whether the bands that they accept overlap, but for ``ALIKE``, and both rates have a say
     alike: bool
 
-    @classmethod
-    def alone(cls, look: Look, valve: int) -> "Agreement":
-        """Return what one rate says, its word taken for as much as that of two."""
-        return cls(look, look.beyond_price(valve), look.covers(valve))
-
 
 def price_beside(wave_gain: float | None) -> float:
     """Return −2 log likelihood that friction must gain to be believed.
@@ -223,8 +218,12 @@ def samples_between_reports(record: Record) -> float:
 def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
     """Return the neighbouring rates that agree best on a valve's friction."""
     if len(seen) == 1:
-        return Agreement.alone(seen[0], valve)
-    say, pairs = _with_a_say(seen, valve), []
+        return Agreement(seen[0], seen[0].beyond_price(valve), seen[0].covers(valve))
+    covers = [look.covers(valve) for look in seen]
+    finds = [look.beyond_price(valve) > 0.0 for look in seen]
+    # Those that cover the process count, and those that such confirm.
+    say = [covers[k] or (all(finds[k + 1 :]) and any(covers[k + 1 :])) for k in range(len(seen))]
+    pairs = []
     for k, two in enumerate(itertools.pairwise(seen)):
         bands = [look.accepted[valve].band for look in two]
         low, high = max(band[0] for band in bands), min(band[1] for band in bands)
@@ -233,10 +232,3 @@ def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
         more = gains.index(max(gains))
         pairs.append(Agreement(two[more], min(gains), alike))
     return max(pairs, key=lambda pair: (pair.alike, pair.gain))
-
-
-def _with_a_say(seen: tuple[Look, ...], valve: int) -> list[bool]:
-    """Return which rates count: those that cover the process, and those that such confirm."""
-    covers = [look.covers(valve) for look in seen]
-    finds = [look.beyond_price(valve) > 0.0 for look in seen]
-    return [covers[k] or (all(finds[k + 1 :]) and any(covers[k + 1 :])) for k in range(len(seen))]

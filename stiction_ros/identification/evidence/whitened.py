@@ -140,7 +140,14 @@ class Whitened:
 
         Shapes (q, q) and (q,).
         """
-        out, seen, energy = self._with_precision(prior), self.seen_products, energy_of(self.seen)
+        seen, energy = self.seen_products, energy_of(self.seen)
+        out, precision = self.products.copy(), prior.precision(self.edges)
+        if len(self.known.rows) > 1:
+            waves = np.arange(1, len(self.known.rows))
+            out[waves, waves] += 1.0 / self.wave_variances(prior)
+        for start in range(len(self.known.rows), len(out), len(precision)):
+            block = slice(start, start + len(precision))
+            out[block, block] += precision
         held = self.held(prior) if self.at >= 0 else None
         if held is not None:
             block = self.block(self.at)
@@ -149,16 +156,6 @@ class Whitened:
             seen[block] += held.pull
             energy += held.energy
         return out, seen, energy
-
-    def _with_precision(self, prior: ResponsePrior) -> FloatArray:
-        out, precision = self.products.copy(), prior.precision(self.edges)
-        if len(self.known.rows) > 1:
-            waves = np.arange(1, len(self.known.rows))
-            out[waves, waves] += 1.0 / self.wave_variances(prior)
-        for start in range(len(self.known.rows), len(out), len(precision)):
-            block = slice(start, start + len(precision))
-            out[block, block] += precision
-        return out
 
     def log_determinant(self, prior: ResponsePrior) -> float:
         """Return log det of the prior covariance of everything but the constant."""
