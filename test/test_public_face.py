@@ -104,7 +104,7 @@ def test_every_argument_of_a_function_is_explained(name: str) -> None:
     for parameter in inspect.signature(getattr(stiction_ros, name)).parameters:
         assert re.search(rf"^(\w+, )*{parameter}(, \w+)*:", arguments, re.MULTILINE), parameter
     returned = inspect.signature(getattr(stiction_ros, name)).return_annotation
-    if returned != "None":
+    if returned is not None:
         assert section(text, "Returns") or text.startswith("Return"), "says what it returns"
     assert section(text, "Raises")
 

@@ -128,9 +128,7 @@ def _report_unit(scenario: "UnitScenario", directory: Path, seconds: float) -> b
 
     from stiction_ros.report.run.unit import UNIT_COLUMNS, report_unit, unit_rows
 
-    report = report_unit(
-        directory / "bag", directory, list(scenario.members), scenario=scenario, seconds=seconds
-    )
+    report = report_unit(directory / "bag", directory, scenario, seconds)
     console = Console()
     for line in report.found.sentences:
         console.print(f"{scenario.name}: {line}")

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 from sensor_msgs.msg import JointState
 
 from stiction_ros.control import ControlMode
-from stiction_ros.identification import Identification
 from stiction_ros.nodes.shared.messages import joint_state
 from stiction_ros.online.estimator.live import FitUpdate
 from stiction_ros.online.monitor.gap_finding import GapFinding
@@ -21,38 +20,25 @@ Rows = Mapping[str, tuple[float, float, float]]
 Keys = list[tuple[str, object]]
 
 
-def friction_message(stamp: int, token: str, found: Identification | None) -> JointState:
+def friction_message(stamp: int, by: str, rows: Rows) -> JointState:
     """Return value, lower and upper end of every friction; empty for an unusable window.
 
-    Args:
-        stamp: end of the window, ns.
-        token: ``valid_from`` of the loop model in force, as text.
-        found: the fit, or None when the window was not usable.
+    The ``stamp`` is the end of the window, ns; ``by`` is ``valid_from`` of the loop model in force.
     """
-    return _friction(stamp, token, {} if found is None else found.rows)
-
-
-def tested_message(stamp: int, valve: str, found: "Judgement") -> JointState:
-    """Return what a valve test says of the friction of its valve.
-
-    Args:
-        stamp: end of the test, ns.
-        valve: tag.
-        found: the verdict.
-    """
-    rows = {
-        f"{valve}.f_s": (found.f_s, *found.f_s_interval),
-        f"{valve}.f_d": (found.f_d, *found.f_d_interval),
-    }
-    return _friction(stamp, ControlMode.VALVE_TEST, rows)
-
-
-def _friction(stamp: int, by: str, rows: Rows) -> JointState:
     message = joint_state(stamp, list(rows), [value for value, _, _ in rows.values()])
     message.velocity = [low for _, low, _ in rows.values()]
     message.effort = [high for _, _, high in rows.values()]
     message.header.frame_id = by
     return message
+
+
+def tested_message(stamp: int, valve: str, found: "Judgement") -> JointState:
+    """Return what a valve test that ended at ``stamp``, ns, says of the friction of its valve."""
+    rows = {
+        f"{valve}.f_s": (found.f_s, *found.f_s_interval),
+        f"{valve}.f_d": (found.f_d, *found.f_d_interval),
+    }
+    return friction_message(stamp, ControlMode.VALVE_TEST, rows)
 
 
 def fit_status(stamp: int, update: FitUpdate) -> tuple[str, str, Keys]:

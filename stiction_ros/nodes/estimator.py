@@ -221,7 +221,9 @@ class EstimatorNode(ManagedNode):
             self.notice("missed", "warn", text)
         for sample in range(found.sample - found.missed, found.sample):
             if self.settings.due(sample):
-                self._publish(self._pairs.stamp_of(sample), None)
+                self._stiction.publish(
+                    friction_message(self._pairs.stamp_of(sample), self._token, {})
+                )
 
     # ---- fits out --------------------------------------------------------------------------
 
@@ -244,7 +246,7 @@ class EstimatorNode(ManagedNode):
                 if not isinstance(error, InputError):
                     self._said = f"fit failed: {error!r}"
                     self.log.error(self._said)
-                self._publish(stamp, None)
+                self._stiction.publish(friction_message(stamp, self._token, {}))
                 continue
             self._fits += 1
             self._announce(stamp, update)
@@ -260,14 +262,10 @@ class EstimatorNode(ManagedNode):
             self._token = str(valid_from)
             text = update.loop_model.to_yaml(valid_from=valid_from)
             self._model.publish(String(data=text))
-        self._publish(stamp, update.identification)
+        self._stiction.publish(friction_message(stamp, self._token, update.identification.rows))
         self._said = f"last window: {verdicts_of(update)}"
         self.log.info(f"window to sample {update.end}: {figures_of(update)}")
         self.report([fit_status(stamp, update)])
-
-    def _publish(self, stamp: int, found: Identification | None) -> None:
-        """Publish one fit, or None for a window that was not usable."""
-        self._stiction.publish(friction_message(stamp, self._token, found))
 
 
 def main() -> int:

@@ -7,7 +7,7 @@ numbers.
 import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -92,17 +92,17 @@ def node_values(section: Section) -> dict[str, Any]:
 
 @dataclasses.dataclass(frozen=True)
 class SimulatedPlant:
-    """What the plant of a scenario is told: the loop, its set-points, seed, samples, changes."""
+    """What the plant of a scenario is told."""
 
-    model: LoopModel
-    set_points: SetPoints
-    seed: int
+    plant: LoopModel  # the loop that is simulated
+    set_points: SetPoints  # schedule
+    seed: int  # of its noise
     samples: int
-    valve_changes: tuple[ValveChange, ...]
+    valve_changes: tuple[ValveChange, ...]  # valves that change in mid-run
 
-    def with_ideal_valves(self) -> "SimulatedPlant":
+    def with_ideal_valves(self) -> Self:
         """Return the same plant with valves that follow OP exactly, to the end."""
-        return dataclasses.replace(self, model=self.model.with_ideal_valves(), valve_changes=())
+        return dataclasses.replace(self, plant=self.plant.with_ideal_valves(), valve_changes=())
 
     def run(
         self,
@@ -113,7 +113,7 @@ class SimulatedPlant:
     ) -> ClosedLoopRun:
         """Simulate the plant under ``controller``; ``seed`` and ``samples`` in place of its own."""
         return simulate_closed_loop(
-            self.model,
+            self.plant,
             controller,
             self.set_points,
             self.samples if samples is None else samples,
@@ -144,8 +144,8 @@ def read_plant(values: Mapping[str, Any], path: Path) -> SimulatedPlant:
 
 
 @dataclasses.dataclass(frozen=True)
-class Scenario:
-    """One scenario file: the parameters of all nodes of a loop.
+class Scenario(SimulatedPlant):
+    """One scenario file: the plant, and the parameters of all nodes of its loop.
 
     Attributes:
         name: stem of the file.
@@ -154,10 +154,10 @@ class Scenario:
         plant, process: the simulated loop, and the model that the controller is built from.
         set_points: schedule.
         seed, samples: of the plant.
+        valve_changes: valves of the plant that change in mid-run.
         controller, estimator: settings of the two.
         monitor: rule of the estimator's monitor.
         monitor_model: what the monitor compares with; None for the loop as it is identified.
-        valve_changes: valves of the plant that change in mid-run.
 
     Examples:
         >>> from stiction_ros import Scenario, find_config
@@ -169,26 +169,14 @@ class Scenario:
     name: str
     path: Path
     nodes: Mapping[str, Mapping[str, Any]]
-    plant: LoopModel
     process: LoopModel
-    set_points: SetPoints
-    seed: int
-    samples: int
     controller: LiveControllerSettings
     estimator: EstimatorSettings
     monitor: MonitorRule = MonitorRule()
     monitor_model: LoopModel | None = None
-    valve_changes: tuple[ValveChange, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Scenario {self.name}: {self.samples} samples of {self.plant!r}, seed {self.seed}>"
-
-    @property
-    def simulated(self) -> SimulatedPlant:
-        """The plant with its set-points, seed, samples and changes."""
-        return SimulatedPlant(
-            self.plant, self.set_points, self.seed, self.samples, self.valve_changes
-        )
 
     @classmethod
     def load(cls, path: Path | str) -> "Scenario":
@@ -209,7 +197,7 @@ class Scenario:
 
     @classmethod
     def of(
-        cls, name: str, path: Path, nodes: Mapping[str, Mapping[str, Any]], plant: SimulatedPlant
+        cls, name: str, path: Path, nodes: Mapping[str, Mapping[str, Any]], told: SimulatedPlant
     ) -> "Scenario":
         """Return the scenario of one loop from what its nodes are told.
 
@@ -217,12 +205,12 @@ class Scenario:
             name: of the scenario.
             path: of the file, to which file names are relative.
             nodes: parameters by node name.
-            plant: what is simulated.
+            told: what its plant is told.
 
         Raises:
             InputError: anything missing or wrong, in one line.
         """
-        model = plant.model
+        model = told.plant
         checked: dict[str, Any] = {
             node: settings_from_mapping(NODE_SETTINGS[node], nodes[node], f"{path}: {node}")
             for node in ("controller", "estimator")
@@ -239,10 +227,10 @@ class Scenario:
         if checked["estimator"].monitor_model:
             watched = LoopModel.load(path.parent / checked["estimator"].monitor_model)
         for key in (field.name for field in dataclasses.fields(FitSchedule)):
-            told, awaited = getattr(checked["estimator"], key), getattr(controller, key)
-            if told != awaited:
+            own, awaited = getattr(checked["estimator"], key), getattr(controller, key)
+            if own != awaited:
                 raise InputError(
-                    f"is {told} for the estimator and {awaited} for the controller",
+                    f"is {own} for the estimator and {awaited} for the controller",
                     where=f"{path}: {key}",
                     fix="give both the same value",
                 )
@@ -254,19 +242,15 @@ class Scenario:
         except InputError as error:
             raise error.within(str(path)) from None
         return cls(
-            name,
-            path,
-            nodes,
-            model,
-            process,
-            plant.set_points,
-            plant.seed,
-            plant.samples,
-            controller,
-            checked["estimator"],
-            checked["estimator"],
-            watched,
-            plant.valve_changes,
+            **vars(told),
+            name=name,
+            path=path,
+            nodes=nodes,
+            process=process,
+            controller=controller,
+            estimator=checked["estimator"],
+            monitor=checked["estimator"],
+            monitor_model=watched,
         )
 
 
@@ -393,6 +377,6 @@ def run_live(
         >>> live.run.record.pv.shape, live.swap
         ((60, 1), None)
     """
-    plant = scenario.simulated.with_ideal_valves() if ideal_valves else scenario.simulated
-    loop = LoopSession(scenario, plant.model, identify)
-    return loop.told(plant.run(loop, seed, samples, progress))
+    told = scenario.with_ideal_valves() if ideal_valves else scenario
+    loop = LoopSession(scenario, told.plant, identify)
+    return loop.told(told.run(loop, seed, samples, progress))

@@ -49,7 +49,7 @@ class UnitScenario:
     path: Path  # the file
     # parameters by node: ``plant``, ``recorder``, ``TC1/controller`` …
     nodes: Mapping[str, Mapping[str, Any]]
-    plant: SimulatedPlant  # what is simulated
+    simulated: SimulatedPlant  # what the plant is told
     loops: tuple[MemberLoop, ...]  # tags of each loop
     # the scenario of each loop by itself, in the same order; its plant is the process that its
     # controller knows
@@ -73,13 +73,14 @@ class UnitScenario:
         told = {name: _parameters(top, name) for name in SHARED}
         for node, given in told.items():
             settings_from_mapping(NODE_SETTINGS[node], given, f"{path}: {node}")
-        plant = read_plant(told["plant"], path)
+        simulated = read_plant(told["plant"], path)
+        plant = simulated.plant
         where = f"{path}: plant: loops"
-        loops = read_member_loops(told["plant"].get("loops", ()), plant.model, where)
+        loops = read_member_loops(told["plant"].get("loops", ()), plant, where)
         if not loops:
             raise InputError("names no loop", where=where, fix="write NAME: VALVE -> OUTPUT")
         common = {node: _parameters(top, f"/**/{node}") for node in OWN}
-        wiring, members = Wiring(plant.model, loops), {}
+        wiring, members = Wiring(plant, loops), {}
         for loop in loops:
             own = top.section(loop.name, {})
             nodes = {n: copy.deepcopy(common[n]) | _parameters(own, n) for n in OWN}
@@ -92,12 +93,12 @@ class UnitScenario:
                     where=f"{path}: {loop.name}: controller: {known.name}",
                     fix=f"use {', '.join(loop.valves)} and {', '.join(loop.outputs)}",
                 )
-            moves = wiring.of(loop, plant.set_points.values)
-            schedule = dataclasses.replace(plant.set_points, outputs=loop.outputs, values=moves)
-            alone = SimulatedPlant(known, schedule, plant.seed, plant.samples, ())
+            moves = wiring.of(loop, simulated.set_points.values)
+            schedule = dataclasses.replace(simulated.set_points, outputs=loop.outputs, values=moves)
+            alone = SimulatedPlant(known, schedule, simulated.seed, simulated.samples, ())
             members[loop.name] = Scenario.of(loop.name, path, nodes, alone)
         top.finish()
-        return cls(path.name.split(".")[0], path, told, plant, tuple(loops), members)
+        return cls(path.name.split(".")[0], path, told, simulated, tuple(loops), members)
 
 
 def load_scenario(path: Path | str) -> Scenario | UnitScenario:
@@ -122,7 +123,7 @@ class _Sessions:
     """All loops behind the face that a simulated plant calls."""
 
     def __init__(self, scenario: UnitScenario, identify: bool) -> None:
-        self.wiring = Wiring(scenario.plant.model, scenario.loops)
+        self.wiring = Wiring(scenario.simulated.plant, scenario.loops)
         self.sessions = [
             LoopSession(member, member.plant, identify) for member in scenario.members.values()
         ]
@@ -164,8 +165,8 @@ def run_unit(
         InputError: a controller cannot be built from its process.
     """
     sessions = _Sessions(scenario, identify)
-    plant = scenario.plant.with_ideal_valves() if ideal_valves else scenario.plant
-    run, model = plant.run(sessions, seed, samples, progress), plant.model
+    told = scenario.simulated.with_ideal_valves() if ideal_valves else scenario.simulated
+    run, model = told.run(sessions, seed, samples, progress), told.plant
     wiring, sp, found = sessions.wiring, np.array(sessions.sp), {}
     for loop, session, op in zip(wiring.loops, sessions.sessions, sessions.op, strict=True):
         columns = [model.valve_names.index(tag) for tag in loop.valves if tag in model.valve_names]

@@ -48,7 +48,8 @@ async def _browse(client: "Client", root: str) -> dict[tuple[str, str], str]:
                     continue
                 seen.add(one.NodeId)
                 if len(seen) > MOST:
-                    raise InputError(f"more than {MOST} nodes", where=url_of(client), fix="--root")
+                    where = str(client.server_url.geturl())
+                    raise InputError(f"more than {MOST} nodes", where=where, fix="--root")
                 name = one.BrowseName.Name
                 if one.NodeClass == ua.NodeClass.Variable:
                     group, _, last = name.rpartition(".")
@@ -56,11 +57,6 @@ async def _browse(client: "Client", root: str) -> dict[tuple[str, str], str]:
                 below.append((client.get_node(one.NodeId), name))
         level = below
     return found
-
-
-def url_of(client: "Client") -> str:
-    """Return the address of a client without anything secret."""
-    return str(client.server_url.geturl())
 
 
 def loops_of(

@@ -14,7 +14,7 @@ from stiction_ros.effects import FloatArray
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import KINDS, SCRIPT, Curve, against, over_time
 from stiction_ros.report import gap_words as say
-from stiction_ros.report.page import Cell, card, folded, number, table
+from stiction_ros.report.page import Cell, card, folded, number, table, write_page
 from stiction_ros.signals.holds import stretches
 
 CANDIDATES = (
@@ -35,11 +35,7 @@ WINDOW = 400  # samples that are drawn, where an effect moves PV most
 
 def report_gap(found: Discrepancy, out: str | Path) -> Path:
     """Write ``report.html`` into the folder ``out`` and return the page."""
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    target = folder / "report.html"
-    target.write_text(gap_page(found), encoding="utf-8")
-    return target
+    return write_page(Path(out) / "report.html", gap_page(found))
 
 
 def gap_page(found: Discrepancy) -> str:

@@ -1,22 +1,30 @@
 """What reports are made of: boxes, tables, and figures in words."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from stiction_ros.pages import frame
 from stiction_ros.pages.frame import SCROLLED, text, words
+from stiction_ros.texts import json_text
 
 Cell = str | tuple[str, str]  # text of a table cell, or its class and its text
 
 
-def page_file(out: str | Path) -> tuple[Path, Path | None]:
-    """Return the file of a page, and its folder, made where need be; None for a lone ``.html``."""
+def write_page(out: str | Path, page: str, figures: Mapping[str, Any] | None = None) -> Path:
+    """Write ``report.html`` and ``summary.json`` into a folder, or a lone ``.html`` file.
+
+    Folders are made where need be. The page is returned, without ``figures`` it is alone.
+    """
     out = Path(out)
     alone = out.suffix.lower() == ".html"
-    folder = out.parent if alone else out
-    folder.mkdir(parents=True, exist_ok=True)
-    return (out, None) if alone else (folder / "report.html", folder)
+    target = out if alone else out / "report.html"
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(page, encoding="utf-8")
+    if figures is not None and not alone:
+        (out / "summary.json").write_text(json_text(figures) + "\n", encoding="utf-8")
+    return target
 
 
 def count(value: object) -> str:

@@ -15,7 +15,7 @@ from stiction_ros.pages.signals import UNITS, all_signals, close_look
 from stiction_ros.records.parts import joined, span
 from stiction_ros.records.record import Record
 from stiction_ros.records.valve_work import ValveWork
-from stiction_ros.report.page import Cell, number, page_file, table
+from stiction_ros.report.page import Cell, number, table, write_page
 from stiction_ros.report.run.identified import process_table, valve_cards, verdict_line
 from stiction_ros.report.shapes import free_run, responses
 from stiction_ros.texts import finite, probability
@@ -46,9 +46,7 @@ def report_record(
         >>> report_record(record, found, "report.html").name
         'report.html'
     """
-    target, _ = page_file(out)
-    target.write_text(record_page(record, identification, parts), encoding="utf-8")
-    return target
+    return write_page(out, record_page(record, identification, parts))
 
 
 def record_page(

@@ -74,7 +74,7 @@ def test_a_loop_alone_on_its_plant_is_the_loop_that_it_is_by_itself() -> None:
         "alone",
         scenario.path,
         {},
-        type(scenario.plant)(model, member.set_points, 1, 100, ()),
+        type(scenario.simulated)(model, member.set_points, 1, 100, ()),
         (scenario.loops[1],),
         {"FC1": member},
     )

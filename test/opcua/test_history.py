@@ -9,7 +9,6 @@ import pytest
 from as_given import read_csv_parts
 from plant_process import START, PlantProcess, wait_until
 from small_maps import MODE, OP, PV, SP, loop_tags
-from stiction_ros.records.quality import Quality
 
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
@@ -18,6 +17,7 @@ from stiction_ros.opcua.history import HistoryFile, Span, modes_of, record_of
 from stiction_ros.opcua.sampling import TagQuality, TagReading
 from stiction_ros.opcua.tag_map import ValveTags
 from stiction_ros.records.csv_writer import write_csv
+from stiction_ros.records.record import Quality
 
 SCANS = 60
 

@@ -93,7 +93,6 @@ def log() -> RunLog:
         ),
         (Text("/loop_model", first, "loop: made_up"),),
         (Text("/plant/config", first, PLANT),),
-        (),
         {"/pv": SAMPLES, "/clock": 12},
         {"/pv": SAMPLES},
         ("a note <of> the reader",),

@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from stiction_ros.effects import Stiction, behaviours
 from stiction_ros.errors import InputError
@@ -10,6 +10,8 @@ from stiction_ros.errors import InputError
 if TYPE_CHECKING:
     from stiction_ros.identification import Identification, IdentificationOptions
     from stiction_ros.records.record import Record
+
+T = TypeVar("T", int, float)
 
 # The modules that give these words their meaning load slowly, and a mistyped option should be
 # told at once; test/cli/test_choices.py holds both together.
@@ -67,19 +69,19 @@ def add_search_options(parser: Any) -> None:
 
 def friction_limit(text: str) -> float | tuple[float, ...]:
     """Return one number, or one for each valve, from ``F`` or ``F,F``."""
-    try:
-        values = tuple(float(word) for word in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number, write F or F,F") from None
-    return values[0] if len(values) == 1 else values
+    return _each(text, float, "number, write F or F,F")
 
 
 def output_orders(text: str) -> int | tuple[int, ...]:
     """Return one order, or one for each output, from ``N`` or ``N,N``."""
+    return _each(text, int, "order, write N or N,N")
+
+
+def _each(text: str, kind: type[T], wanted: str) -> T | tuple[T, ...]:
     try:
-        values = tuple(int(word) for word in text.split(","))
+        values = tuple(kind(word) for word in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no order, write N or N,N") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is no {wanted}") from None
     return values[0] if len(values) == 1 else values
 
 

@@ -19,7 +19,6 @@ from stiction_ros.records.storage.bag_metadata import BagTopic
 
 _DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 _STRING = "std_msgs/msg/String"
-_CLOCK = "rosgraph_msgs/msg/Clock"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 FIGURES = ("p50", "p99", "p999", "max")
 
@@ -81,7 +80,7 @@ class _Status(NamedTuple):
 
 
 def of_loop(messages: Iterable[BagMessage], space: str) -> list[BagMessage]:
-    """Return the messages of the loop in the namespace ``space``, and what is global.
+    """Return the messages of the loop in the namespace ``space``.
 
     Of the diagnostics, a topic that loops share, the statuses of the loop's own nodes are kept.
     """
@@ -93,9 +92,7 @@ def of_loop(messages: Iterable[BagMessage], space: str) -> list[BagMessage]:
             own = [s for s in every if last_part("/" + node_of(s))[0] == space]
             only = types.SimpleNamespace(header=header, status=own)
             kept.append(dataclasses.replace(message, message=only))
-        elif (
-            name == "clock" or (last_part(namespace)[0] if name == "config" else namespace) == space
-        ):
+        elif (last_part(namespace)[0] if name == "config" else namespace) == space:
             kept.append(message)
     return kept
 
@@ -231,14 +228,6 @@ def texts(messages: Iterable[BagMessage], name: str) -> tuple[Text, ...]:
     )
 
 
-def clock(messages: Iterable[BagMessage]) -> tuple[int, ...]:
-    """Return the times on ``/clock``, ns."""
-    return tuple(
-        int(message.message.clock.sec) * 10**9 + int(message.message.clock.nanosec)
-        for message in _of(messages, _CLOCK, "clock")
-    )
-
-
 def published_counts(messages: Iterable[BagMessage]) -> dict[str, int]:
     """Return how many messages of each topic the nodes say they published.
 
@@ -262,7 +251,6 @@ def tells_of_run(topic: BagTopic) -> bool:
     return (topic.type, name) in {
         (JOINT_STATE, "stiction"),
         (_DIAGNOSTICS, "diagnostics"),
-        (_CLOCK, "clock"),
         (_TRAJECTORY, "prediction"),
         (_STRING, "mode"),
         (_STRING, "loop_model"),

@@ -26,7 +26,6 @@ class RunLog:
     modes: tuple[events.ModeChange, ...]  # changes of mode, model or friction, the first mode first
     loop_models: tuple[events.Text, ...]  # the YAML texts on ``loop_model``
     configs: tuple[events.Text, ...]  # what the nodes published on ``~/config``
-    clock: tuple[int, ...]  # the simulated times on ``/clock``, ns
     recorded: Mapping[str, int]  # messages in the bag by topic
     published: Mapping[str, int]  # messages by topic as the nodes counted them in ``/diagnostics``
     notes: tuple[str, ...] = ()  # what was left out while reading, one sentence each
@@ -120,7 +119,6 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
         modes=events.mode_changes(said) or events.mode_texts(said),
         loop_models=events.texts(configured, "loop_model"),
         configs=configs,
-        clock=events.clock(said),
         recorded=dict(recorded),
         published=published,
         notes=record.notes,

@@ -17,15 +17,15 @@ from stiction_ros.report.page import (
     folded,
     interval,
     number,
-    page_file,
     percent,
     table,
+    write_page,
 )
 from stiction_ros.report.run import identified
 from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import Story, tell
-from stiction_ros.report.run.summary import measured, messages, summary, work_rows, write_json
+from stiction_ros.report.run.summary import measured, messages, summary, work_rows
 
 _SCORES = (
     ("amplitude", "amplitude of the cycle", ""),
@@ -336,12 +336,10 @@ def _growth(look: Mapping[str, Any]) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class RunReport:
-    """What was written: the story of the run, ``summary.json``, the page, and all files."""
+    """What was written: ``summary.json`` and the page."""
 
-    story: Story
     summary: dict[str, Any]
     page: Path
-    files: tuple[Path, ...]
 
 
 def report_run(
@@ -349,7 +347,6 @@ def report_run(
     out: str | Path,
     *,
     scenario: Scenario | None = None,
-    name: str | None = None,
     seconds: float | None = None,
     load: float | None = None,
     namespace: str | None = None,
@@ -360,23 +357,16 @@ def report_run(
         bag: a rosbag2 directory or a ``.mcap`` file.
         out: folder, made when missing; or the ``.html`` file alone.
         scenario: that was run, for the comparison with a loop without friction.
-        name: of the loop in the report; the scenario's or the bag's when not given.
         seconds, load: wall time of the run, and of the machine before it, where known.
         namespace: of the loop's topics, for a bag that holds several loops.
     """
-    log = read_run(bag, namespace=namespace)
-    return write_run(tell(log, scenario=scenario, name=name), out, seconds, load)
+    story = tell(read_run(bag, namespace=namespace), scenario=scenario)
+    return write_run(story, out, seconds, load)
 
 
 def write_run(
     story: Story, out: str | Path, seconds: float | None = None, load: float | None = None
 ) -> RunReport:
     """Write what :func:`report_run` writes of a run that has been scored."""
-    target, folder = page_file(out)
-    target.write_text(run_page(story), encoding="utf-8")
     figures = summary(story, seconds, load)
-    files = [target]
-    if folder is not None:
-        write_json(figures, folder / "summary.json")
-        files.append(folder / "summary.json")
-    return RunReport(story, figures, target, tuple(files))
+    return RunReport(figures, write_page(out, run_page(story), figures))

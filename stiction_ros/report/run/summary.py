@@ -1,12 +1,11 @@
 """``summary.json`` of a run: the figures that acceptance looks at."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from stiction_ros.report.run.scoring import Phase
 from stiction_ros.report.run.story import Story
-from stiction_ros.texts import finite, json_text
+from stiction_ros.texts import finite
 
 KEYS = (
     ("travel", "travel, %/h"),
@@ -76,11 +75,6 @@ def messages(
         topic: {"published": published.get(topic), "recorded": recorded.get(topic, 0)}
         for topic in sorted(published.keys() | recorded.keys())
     }
-
-
-def write_json(value: Mapping[str, Any], path: str | Path) -> None:
-    """Write ``value`` as JSON that every reader takes."""
-    Path(path).write_text(json_text(value) + "\n", encoding="utf-8")
 
 
 def work_rows(

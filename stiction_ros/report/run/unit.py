@@ -1,7 +1,7 @@
 """The report of several loops on one plant: whose valve it is, and what the swap did to all."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +9,13 @@ from stiction_ros.online.unit import UnitScenario
 from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.log import read_run
-from stiction_ros.report.page import Cell, duration, number, page_file, table
+from stiction_ros.report.page import Cell, duration, number, table, write_page
 from stiction_ros.report.run.figures import whole_run
 from stiction_ros.report.run.identified import KINDS, valve_cards
 from stiction_ros.report.run.report import findings
 from stiction_ros.report.run.scoring import Phase, PhaseStatus, errors, phases
 from stiction_ros.report.run.story import Story, tell
-from stiction_ros.report.run.summary import summary, write_json
+from stiction_ros.report.run.summary import summary
 from stiction_ros.signals.oscillation import amplitude
 from stiction_ros.survey.neighbours import Neighbours, is_outer, neighbours
 
@@ -44,55 +44,39 @@ class UnitReport:
         return self.stories[self.swapped].phases.status.value
 
 
-def report_unit(
-    bag: str | Path,
-    out: str | Path,
-    loops: Sequence[str],
-    *,
-    scenario: UnitScenario | None = None,
-    seconds: float | None = None,
-) -> UnitReport:
+def report_unit(bag: Path, out: Path, scenario: UnitScenario, seconds: float) -> UnitReport:
     """Read a bag of several loops and write ``summary.json`` and one ``report.html``.
 
     Args:
-        bag: a rosbag2 directory or a ``.mcap`` file.
-        out: folder, made when missing; or the ``.html`` file alone.
-        loops: their namespaces.
-        scenario: that was run, for what is known of the plant.
-        seconds: wall time of the run, when measured better than by the bag.
+        bag: a rosbag2 directory.
+        out: folder, made when missing.
+        scenario: that was run.
+        seconds: wall time of the run.
 
     Raises:
         InputError: as :func:`stiction_ros.records.run.log.read_run`.
     """
-    told = {name.strip("/"): tell(read_run(bag, namespace=name), name=name) for name in loops}
-    name = Path(bag).name if scenario is None else scenario.name
+    told = {name: tell(read_run(bag, namespace=name), name=name) for name in scenario.members}
     swaps = {n: k for n, one in told.items() if (k := one.log.swap_sample) is not None}
     swapped = min(swaps, key=lambda n: swaps[n], default="")
     swap = swaps.get(swapped)
-    plant = None if scenario is None else scenario.plant
-    repeat = None if plant is None else round(plant.set_points.repeat / plant.model.sample_time)
+    truth = scenario.simulated.plant
+    repeat = round(scenario.simulated.set_points.repeat / truth.sample_time)
     stories = {
         n: dataclasses.replace(
-            one,
-            name=n,
-            phases=phases(one.record, swap, repeat),
-            round_samples=repeat,
-            truth=None if plant is None else plant.model,
+            one, phases=phases(one.record, swap, repeat), round_samples=repeat, truth=truth
         )
         for n, one in told.items()
     }
     found = neighbours(
         {n: one.record.part(0, swap or len(one.record)) for n, one in stories.items()}
     )
-    report = UnitReport(name, stories, swapped, found)
-    target, folder = page_file(out)
-    target.write_text(unit_page(report), encoding="utf-8")
-    if folder is not None:
-        write_json(unit_summary(report, seconds), folder / "summary.json")
-    return dataclasses.replace(report, page=target)
+    report = UnitReport(scenario.name, stories, swapped, found)
+    page = write_page(out, unit_page(report), unit_summary(report, seconds))
+    return dataclasses.replace(report, page=page)
 
 
-def unit_summary(report: UnitReport, seconds: float | None = None) -> dict[str, Any]:
+def unit_summary(report: UnitReport, seconds: float) -> dict[str, Any]:
     """Return the mapping of ``summary.json``; ``seconds`` is the wall time of the run."""
     return {
         "scenario": report.name,

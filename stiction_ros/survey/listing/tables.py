@@ -26,24 +26,16 @@ _TYPES = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
 "application/vnd.openxmlformats-officedocument.spreadsheetml.worksheet+xml"/>
 </Types>"""
 
-_TOP = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
+_PART = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
 <Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
 <Relationship Id="r1" Type=\
-"http://schemas.openxmlformats.org/officeDocument/2006/relationships/officeDocument" \
-Target="xl/workbook.xml"/>
+"http://schemas.openxmlformats.org/officeDocument/2006/relationships/{kind}" Target="{target}"/>
 </Relationships>"""
 
 _BOOK = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
 <workbook xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main" xmlns:r=\
 "http://schemas.openxmlformats.org/officeDocument/2006/relationships">
 <sheets><sheet name="loops" sheetId="1" r:id="r1"/></sheets></workbook>"""
-
-_BOOK_PARTS = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
-<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
-<Relationship Id="r1" Type=\
-"http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet" \
-Target="worksheets/sheet1.xml"/>
-</Relationships>"""
 
 _SHEET = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
 <worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main">
@@ -108,9 +100,11 @@ def write_xlsx(path: Path, entries: Sequence[Entry]) -> None:
     sheet = _SHEET.format(rows=rows, last=f"{_column(len(HEAD))}{len(table)}")
     parts = {
         "[Content_Types].xml": _TYPES,
-        "_rels/.rels": _TOP,
+        "_rels/.rels": _PART.format(kind="officeDocument", target="xl/workbook.xml"),
         "xl/workbook.xml": _BOOK,
-        "xl/_rels/workbook.xml.rels": _BOOK_PARTS,
+        "xl/_rels/workbook.xml.rels": _PART.format(
+            kind="worksheet", target="worksheets/sheet1.xml"
+        ),
         "xl/worksheets/sheet1.xml": sheet,
     }
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as book:

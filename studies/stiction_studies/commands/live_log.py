@@ -40,4 +40,4 @@ def log_of(live: LiveRun) -> RunLog:
         )
         for change in live.changes
     )
-    return RunLog(record, 0, estimates, modes, (), (), (), {}, {}, (), fits, live.stem_estimate)
+    return RunLog(record, 0, estimates, modes, (), (), {}, {}, (), fits, live.stem_estimate)

@@ -13,9 +13,9 @@ from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.pages.signals import UNITS, View, over_record
 from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.run.log import RunLog, read_run
-from stiction_ros.report.page import duration, number, table
+from stiction_ros.report.page import duration, number, table, write_page
 from stiction_ros.report.run.scoring import Phases, phases
-from stiction_ros.report.run.summary import measured, messages, write_json
+from stiction_ros.report.run.summary import measured, messages
 from stiction_ros.texts import finite
 from stiction_studies.control_system.journal import transfer_steps
 
@@ -84,9 +84,8 @@ def report_opcua(
         "notes": list(log.notes),
     }
     summary["story"] = _story(summary, found)
-    (out / "report.html").write_text(_page(log, summary, transfers), encoding="utf-8")
     told = dict(finite(summary))
-    write_json(told, out / "summary.json")
+    write_page(out, _page(log, summary, transfers), told)
     return told
 
 

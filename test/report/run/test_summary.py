@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from stiction_ros.records.run.log import RunLog
+from stiction_ros.report.page import write_page
 from stiction_ros.report.run.scoring import NOISE_SHARE
 from stiction_ros.report.run.story import tell
-from stiction_ros.report.run.summary import summary, write_json
+from stiction_ros.report.run.summary import summary
 
 
 def test_the_keys_that_the_contract_names(log: RunLog) -> None:
@@ -56,7 +57,7 @@ def test_the_wall_time_that_is_given_counts(log: RunLog) -> None:
 def test_numbers_that_json_does_not_have_become_null(log: RunLog, tmp_path: Path) -> None:
     log = dataclasses.replace(log, wall_seconds=float("nan"), fits=())
     found = summary(tell(log))
-    write_json(found, tmp_path / "summary.json")
+    write_page(tmp_path, "", found)
     read = json.loads((tmp_path / "summary.json").read_text(), parse_constant=pytest.fail)
     assert read["seconds"] is None
     assert read["samples_per_second"] is None
