@@ -61,8 +61,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--family",
         action="append",
-        choices=(*choices.BLIND_FAMILIES, choices.PHYSICS),
-        help="family of loops; may be repeated (single); physics are loops of bench world",
+        choices=(*choices.BLIND_FAMILIES, choices.PHYSICS, choices.PROCESS),
+        help="family of loops; may be repeated (single); physics and process (a model with one "
+        "figure wrong) are loops of bench world",
     )
     group.add_argument("--first", type=int, metavar="SEED", help=f"first seed ({FIRST_SEED})")
     group.add_argument("--loops", type=int, metavar="N", help=f"loops of each family ({LOOPS})")

@@ -54,6 +54,10 @@ class WorldBench:
                 where="--family outside",
                 fix="use stiction bench gap for it",
             )
+        if choices.PROCESS in self.families and len(self.families) > 1:
+            raise InputError(
+                "its table is its own", where="--family process", fix="run it by itself"
+            )
 
     @property
     def cases(self) -> list[Case]:
@@ -76,6 +80,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, machine: str) -> int:
     """Run the benchmark."""
+    from stiction_studies.blind import wrong_process
     from stiction_studies.blind.scores.world_tally import report
 
     chosen = {
@@ -86,6 +91,8 @@ def run(options: argparse.Namespace, machine: str) -> int:
         "full": options.full,
     }
     bench = WorldBench(**{key: value for key, value in chosen.items() if value is not None})
+    if bench.families == (choices.PROCESS,):
+        return wrong_process.run(bench.first, bench.loops, options)
     if options.write is not None:
         write_loops(bench, Path(options.write))
         return 0
