@@ -118,6 +118,8 @@ def fit_noise(
         if best is not None and score >= best[0] - SETTLED:
             break
         best = (score, beta, fitted)
+        if np.array_equal(fitted, ar):  # the next turn would be this one
+            break
         ar = fitted
     assert best is not None
     _, beta, ar = best
@@ -159,7 +161,8 @@ def noise_forms(
         declared: φ of the noise that the model declares, several where an effect may or may
             not colour it; none where it declares nothing.
     """
-    fits = [fit_noise(target, columns, blocks, start) for start in starts]
+    own = {b"" if start is None else start.tobytes(): start for start in starts}
+    fits = [fit_noise(target, columns, blocks, start) for start in own.values()]
     if declared:
         fits = [dataclasses.replace(fit, price=fit.price + ENLARGED, enlarged=True) for fit in fits]
         fits += [given_noise(target, columns, blocks, ar) for ar in declared]
