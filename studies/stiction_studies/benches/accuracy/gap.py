@@ -32,18 +32,12 @@ LOG = "bench_gap.jsonl"
 
 @dataclasses.dataclass(frozen=True)
 class GapBench:
-    """What is run.
-
-    Attributes:
-        families: of the loops.
-        first, loops: seeds of every family, ``loops`` of them from ``first`` on.
-        full: bootstraps instead of stored thresholds.
-    """
+    """What is run."""
 
     families: tuple[str, ...] = ("single",)
     first: int = FIRST_SEED
-    loops: int = LOOPS
-    full: bool = False
+    loops: int = LOOPS  # seeds of every family, from the first on
+    full: bool = False  # bootstraps instead of stored thresholds
 
     def __post_init__(self) -> None:
         check_seeds(self.first, self.loops)
