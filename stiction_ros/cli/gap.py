@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -83,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
         found = find_discrepancy(model, records, settings, progress=show)
     if options.out is not None:  # first: who reads what is printed may stop doing so
         _write(found, Path(options.out))
-    hand_over(options.json, found.to_dict(), lambda: _print(found))
+    hand_over(options.json, found.to_dict(), lambda: _print(found, options))
     return EXIT_CODES[found.verdict]
 
 
@@ -127,7 +128,7 @@ def _write(found: "Discrepancy", directory: Path) -> None:
     print(f"report: {report_gap(found, directory)}", file=sys.stderr)
 
 
-def _print(found: "Discrepancy") -> None:
+def _print(found: "Discrepancy", options: argparse.Namespace) -> None:
     from stiction_ros.report.gap_words import called, plain
 
     console = Console()
@@ -167,6 +168,10 @@ def _print(found: "Discrepancy") -> None:
         console.print(f"where: {plain(sentence)}", markup=False)
     if found.experiment:
         console.print(f"to learn more: {found.experiment}", markup=False)
+        if found.alternatives:
+            given = [*(["--fit-linear"] if options.fit_linear else []), *options.inputs]
+            command = shlex.join(["stiction", "gap", *given])
+            console.print(f"then with both records: {command} NEXT_RECORD", markup=False)
     if found.untestable:
         listed = ", ".join(called(t.place, t.effect) for t in found.untestable)
         console.print(f"not testable here: {listed}", markup=False)

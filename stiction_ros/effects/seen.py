@@ -79,7 +79,7 @@ class Axis:
         if self.whole:
             coordinates = np.rint(coordinates)
         values = np.exp(coordinates) if self.logarithmic else coordinates
-        return np.clip(values, self.low, self.high)
+        return np.minimum(np.maximum(values, self.low), self.high)
 
     def bounds(self, value: float) -> bool:
         """Tell whether a value lies on the bound of the search, so that a better one may not."""

@@ -305,7 +305,9 @@ class _Search:
         coordinates = settled(self.base, self.gap, self.candidate, coordinates, ar)
         values = self.candidate.values(coordinates)
         response = self.candidate.respond(self.base.run, values)
-        best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
+        best = 0
+        if len(values) > 1:
+            best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
         return coordinates[best], self.judge(values[best], response.pick(best))
 
     def judge(self, values: FloatArray, response: Response) -> CandidateFit:

@@ -15,7 +15,7 @@ from stiction_ros.discrepancy.likelihood.kernels import (
     turn,
     whitened_block,
 )
-from stiction_ros.discrepancy.likelihood.slow_noise import slow_beside_white
+from stiction_ros.discrepancy.likelihood.slow_noise import FIGURES, slow_beside_white
 from stiction_ros.effects import FloatArray
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.signals.autoregression import (
@@ -118,11 +118,13 @@ def fit_noise(
         if best is not None and score >= best[0] - SETTLED:
             break
         best = (score, beta, fitted)
+        if np.array_equal(fitted, ar):  # the next turn would be this one
+            break
         ar = fitted
     assert best is not None
     _, beta, ar = best
     found = _result(target - columns @ beta, beta, ar, blocks, len(ar))
-    return found if len(ar) < MAX_ORDER else _remembering(target, columns, blocks, found)
+    return found if len(ar) <= FIGURES else _remembering(target, columns, blocks, found)
 
 
 def _remembering(
@@ -130,13 +132,13 @@ def _remembering(
 ) -> NoiseFit:
     """Return the fit under white noise beside a first-order one, where that explains more.
 
-    An autoregression whose order is the highest ends before the noise forgets.
+    An autoregression needs many terms for what two figures say, and ends before the noise forgets.
     """
     best = short
     for _ in range(NOISE_FIT_ROUNDS):
         ar = slow_beside_white(best.residual, blocks.train)
         left = given_noise(target, columns, blocks, ar)
-        price = 2.0 * math.log(max(left.rows, 2))
+        price = FIGURES * math.log(max(left.rows, 2))
         left = dataclasses.replace(left, price=price, short=short.ar)
         if left.bic(0) >= best.bic(0) - SETTLED:
             break
@@ -159,7 +161,8 @@ def noise_forms(
         declared: φ of the noise that the model declares, several where an effect may or may
             not colour it; none where it declares nothing.
     """
-    fits = [fit_noise(target, columns, blocks, start) for start in starts]
+    own = {b"" if start is None else start.tobytes(): start for start in starts}
+    fits = [fit_noise(target, columns, blocks, start) for start in own.values()]
     if declared:
         fits = [dataclasses.replace(fit, price=fit.price + ENLARGED, enlarged=True) for fit in fits]
         fits += [given_noise(target, columns, blocks, ar) for ar in declared]

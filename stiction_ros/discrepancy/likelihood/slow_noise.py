@@ -10,6 +10,7 @@ NEGLIGIBLE = 0.01  # of φ
 ROUNDS = 20  # of Gauss-Newton
 MOST = 0.9999  # of either pole: a walk that goes on for ten thousand samples
 BEGUN = ((0.98, 0.5), (0.98, 0.9))  # from which it is looked for: the white part small, and large
+FIGURES = len(BEGUN[0])
 
 
 def counting(ar: FloatArray) -> FloatArray:

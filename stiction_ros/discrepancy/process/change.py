@@ -8,12 +8,14 @@ import numpy as np
 
 from stiction_ros.discrepancy.decision.extend import AddedEffect, open_columns, run_with
 from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.gap_options import MARGIN
 from stiction_ros.discrepancy.likelihood.noise import left_by
 from stiction_ros.discrepancy.process.free_equation import Equation
 from stiction_ros.discrepancy.process.refit import equations_of, process_with, with_equations
 from stiction_ros.discrepancy.process.slower import GAIN, Changeable
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
+from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import ArxProcess
 from stiction_ros.signals.autoregression import whiten
@@ -148,13 +150,44 @@ class _Search:
         self.errors = np.full(len(self.figures), np.inf)
 
     def run(self) -> bool:
+        """Step all figures, then each alone; several have to gain the margin over one.
+
+        Figures that trade off may hide the one that is wrong.
+        """
+        effects, found = self.effects, []
+        if self._eliminate():
+            found.append(self._state())
+        for k in range(len(self.figures)):
+            if found and self.free.sum() == 1 and self.free[k]:
+                continue
+            self.free, self.values = np.arange(len(self.figures)) == k, np.zeros(len(self.figures))
+            self.errors, self.effects = np.full(len(self.figures), np.inf), effects
+            self._settle()
+            bound = self._at_bound()
+            if abs(self.values[k]) > SURE * self.errors[k] and not bound.any():
+                found.append(self._state())
+        if not found:
+            return False
+        best = min(found, key=lambda each: each[0])
+        _, self.free, self.values, self.errors, self.effects = best
+        return True
+
+    def _state(self) -> tuple[float, BoolArray, FloatArray, FloatArray, tuple[AddedEffect, ...]]:
+        """Return the figures as they are, after the BIC that they leave, several by the margin."""
+        run = self._run(self.values)
+        base = Baseline.of(run, columns=open_columns(run, self.effects))
+        given = self.declared and base.declared[self.output]
+        noise = base.under_declared(self.output) if given else base.noise[self.output]
+        count = int(self.free.sum())
+        score = noise.bic(count) + (MARGIN if count > 1 else 0.0)
+        return score, self.free.copy(), self.values.copy(), self.errors.copy(), self.effects
+
+    def _eliminate(self) -> bool:
         """Step all figures, then let the least sure one go, until the rest is sure."""
         while self.free.any():
             self._settle()
             sure = np.where(self.free, np.abs(self.values) / self.errors, np.inf)
-            bound = self.values >= NEAR * self.most
-            bound |= (self.values <= NEAR * self.least) & self.gains
-            bound &= self.free
+            bound = self._at_bound()
             sure[bound & self._several()] = 0.0  # two lags that are alike trade off each other
             least = int(np.argmin(sure))
             if sure[least] > SURE:
@@ -162,7 +195,12 @@ class _Search:
             self.free[least], self.values[least], self.errors[least] = False, 0.0, np.inf
         return False
 
-    def _several(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def _at_bound(self) -> BoolArray:
+        bound = self.values >= NEAR * self.most
+        bound |= (self.values <= NEAR * self.least) & self.gains
+        return np.asarray(bound & self.free)
+
+    def _several(self) -> BoolArray:
         kinds = [
             each.what if free else "" for each, free in zip(self.figures, self.free, strict=True)
         ]

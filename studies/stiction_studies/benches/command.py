@@ -147,12 +147,12 @@ def _hand_over(name: str, options: argparse.Namespace, rows: Sequence[Row]) -> N
 def _world_for_physics(options: argparse.Namespace) -> str:
     """Return the benchmark's name; friction by mechanics is of the world of others."""
     families = options.family or []
-    if options.name != "gap" or choices.PHYSICS not in families:
+    if options.name != "gap" or not {choices.PHYSICS, choices.PROCESS} & set(families):
         return str(options.name)
     if len(set(families)) > 1:
         raise InputError(
-            "physics comes from another world than the other families",
-            where="--family physics",
+            "physics and process come from another world than the other families",
+            where="--family",
             fix="run it by itself",
         )
     return "world"

@@ -58,38 +58,23 @@ class Late(Behaviour):
 
 @dataclasses.dataclass(frozen=True)
 class LateLoop:
-    """A loop with or without an effect from sample :data:`ONSET` on.
+    """A loop with or without an effect from sample :data:`ONSET` on."""
 
-    Attributes:
-        model: what is known of it, without the effect.
-        record: OP and PV, :data:`SAMPLES` long.
-        truth: what sets in; its times count from the first sample.
-    """
-
-    model: LoopModel
-    record: Record
-    truth: Truth
+    model: LoopModel  # what is known of it, without the effect
+    record: Record  # OP and PV, :data:`SAMPLES` long
+    truth: Truth  # what sets in; its times count from the first sample
 
 
 @dataclasses.dataclass(frozen=True)
 class Watched:
-    """What the monitor made of a loop.
+    """What the monitor made of a loop."""
 
-    Attributes:
-        truth: what sets in.
-        looks: measurements before the onset (all of a healthy loop), and behind it.
-        early: measurements before the onset at which the gap counted as grown.
-        delay: samples from the onset to the first alarm behind it; None without.
-        findings: what was found, in order.
-        score: of the finding that stands; ``missed`` without alarm, ``quiet`` in a healthy loop.
-    """
-
-    truth: Truth
-    looks: tuple[int, int]
-    early: int
-    delay: int | None
-    findings: tuple[GapFinding, ...]
-    score: Score
+    truth: Truth  # what sets in
+    looks: tuple[int, int]  # measurements before the onset (all of a healthy loop), and behind it
+    early: int  # measurements before the onset at which the gap counted as grown
+    delay: int | None  # samples from the onset to the first alarm behind it; None without
+    findings: tuple[GapFinding, ...]  # in order
+    score: Score  # of the finding that stands; missed without alarm, quiet in a healthy loop
 
 
 def late_loop(seed: int, *, healthy: bool = False) -> LateLoop:

@@ -10,15 +10,11 @@ from stiction_studies.calibration.plain_loops import plain_loop
 
 @dataclasses.dataclass(frozen=True)
 class KnownLoop:
-    """One record and its truth.
+    """One record and its truth."""
 
-    Attributes:
-        record: as the package reads it.
-        friction: whether the valve has friction that matters and shows; None where it has some
-            that shows in too few slips.
-    """
-
-    record: Record
+    record: Record  # as the package reads it
+    # whether the valve has friction that matters and shows; None where it has some that shows in
+    # too few slips
     friction: bool | None
 
 

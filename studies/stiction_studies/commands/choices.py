@@ -42,6 +42,9 @@ BLIND_FAMILIES = ("single", "two", "outside")
 PHYSICS = "physics"
 """The family of loops of the field whose friction is by the mechanics of the stem."""
 
+PROCESS = "process"
+"""The family of loops whose model has one figure of the process wrong."""
+
 GIVEN = ("exact", "off")
 
 CONTROL_CASES = (

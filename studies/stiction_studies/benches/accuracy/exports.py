@@ -38,19 +38,12 @@ class Reading(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Read:
-    """One export.
+    """One export."""
 
-    Attributes:
-        seed: of it.
-        drawn: what it is like, in words.
-        reading: how it was read.
-        said: the reason of a refusal, or what differs and the notes.
-    """
-
-    seed: int
-    drawn: str
-    reading: Reading
-    said: str
+    seed: int  # of it
+    drawn: str  # what it is like, in words
+    reading: Reading  # how it was read
+    said: str  # the reason of a refusal, or what differs and the notes
 
 
 def judge(seed: int) -> Read:

@@ -32,18 +32,12 @@ LOG = "bench_gap.jsonl"
 
 @dataclasses.dataclass(frozen=True)
 class GapBench:
-    """What is run.
-
-    Attributes:
-        families: of the loops.
-        first, loops: seeds of every family, ``loops`` of them from ``first`` on.
-        full: bootstraps instead of stored thresholds.
-    """
+    """What is run."""
 
     families: tuple[str, ...] = ("single",)
     first: int = FIRST_SEED
-    loops: int = LOOPS
-    full: bool = False
+    loops: int = LOOPS  # seeds of every family, from the first on
+    full: bool = False  # bootstraps instead of stored thresholds
 
     def __post_init__(self) -> None:
         check_seeds(self.first, self.loops)
@@ -61,8 +55,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--family",
         action="append",
-        choices=(*choices.BLIND_FAMILIES, choices.PHYSICS),
-        help="family of loops; may be repeated (single); physics are loops of bench world",
+        choices=(*choices.BLIND_FAMILIES, choices.PHYSICS, choices.PROCESS),
+        help="family of loops; may be repeated (single); physics and process (a model with one "
+        "figure wrong) are loops of bench world",
     )
     group.add_argument("--first", type=int, metavar="SEED", help=f"first seed ({FIRST_SEED})")
     group.add_argument("--loops", type=int, metavar="N", help=f"loops of each family ({LOOPS})")

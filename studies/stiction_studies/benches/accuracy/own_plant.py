@@ -28,22 +28,14 @@ MODES = (ControlMode.UNAWARE.value, ControlMode.INVERSION.value, ControlMode.EMB
 
 @dataclasses.dataclass(frozen=True)
 class OwnPlant:
-    """A first-order plant with dead time.
+    """A first-order plant with dead time."""
 
-    Attributes:
-        gain: PV units per %.
-        time_constant: samples.
-        delay: dead time, samples.
-        noise: standard deviation of the measurement noise, PV units.
-        friction: of its valve.
-        levels: set-points less the first, PV units; each is held for ``HOLD`` samples.
-    """
-
-    gain: float
-    time_constant: float
-    delay: int
-    noise: float
-    friction: HeStiction
+    gain: float  # PV units per %
+    time_constant: float  # samples
+    delay: int  # dead time, samples
+    noise: float  # standard deviation of the measurement noise, PV units
+    friction: HeStiction  # of its valve
+    # set-points less the first, PV units; each is held for ``HOLD`` samples
     levels: FloatArray = dataclasses.field(repr=False)
 
     @classmethod

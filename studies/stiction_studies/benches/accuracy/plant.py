@@ -25,23 +25,14 @@ LONGER = 1.2
 
 @dataclasses.dataclass(frozen=True)
 class Listed:
-    """One loop of the list.
+    """One loop of the list."""
 
-    Attributes:
-        name: of the loop.
-        place: in the list, from 1; None where it was not judged.
-        sticky: whether its valve truly has friction that slips often while in automatic.
-        verdict: what was said of the valve; None where it was not judged.
-        cause_right: whether the cause is one of the true ones; None where none is told.
-        status: ``ok``, ``skipped``, ``failed`` or ``lost``, which the list does not have.
-    """
-
-    name: str
-    place: int | None
-    sticky: bool
-    verdict: str | None
-    cause_right: bool | None
-    status: str
+    name: str  # of the loop
+    place: int | None  # in the list, from 1; None where it was not judged
+    sticky: bool  # whether its valve truly has friction that slips often while in automatic
+    verdict: str | None  # what was said of the valve; None where it was not judged
+    cause_right: bool | None  # whether the cause is one of the true ones; None where none is told
+    status: str  # ``ok``, ``skipped``, ``failed`` or ``lost``, which the list does not have
 
 
 def listed(truth: Mapping[str, Any], survey: Mapping[str, Any]) -> list[Listed]:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
@@ -32,19 +31,13 @@ Case = tuple[str, str, int]  # family, kind of model, seed
 
 @dataclasses.dataclass(frozen=True)
 class WorldBench:
-    """What is run.
-
-    Attributes:
-        families, givens: of the loops.
-        first, loops: seeds of each, ``loops`` of them from ``first`` on.
-        full: bootstraps instead of stored thresholds.
-    """
+    """What is run."""
 
     families: tuple[str, ...] = ("single",)
     givens: tuple[str, ...] = ("exact",)
     first: int = FIRST_SEED
-    loops: int = LOOPS
-    full: bool = False
+    loops: int = LOOPS  # seeds of each family and model, from the first on
+    full: bool = False  # bootstraps instead of stored thresholds
 
     def __post_init__(self) -> None:
         check_seeds(self.first, self.loops)
@@ -53,6 +46,10 @@ class WorldBench:
                 "no loop of the field lies outside the catalogue",
                 where="--family outside",
                 fix="use stiction bench gap for it",
+            )
+        if choices.PROCESS in self.families and len(self.families) > 1:
+            raise InputError(
+                "its table is its own", where="--family process", fix="run it by itself"
             )
 
     @property
@@ -76,6 +73,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, machine: str) -> int:
     """Run the benchmark."""
+    from stiction_studies.blind import wrong_process
     from stiction_studies.blind.scores.world_tally import report
 
     chosen = {
@@ -86,6 +84,8 @@ def run(options: argparse.Namespace, machine: str) -> int:
         "full": options.full,
     }
     bench = WorldBench(**{key: value for key, value in chosen.items() if value is not None})
+    if bench.families == (choices.PROCESS,):
+        return wrong_process.run(bench.first, bench.loops, options)
     if options.write is not None:
         write_loops(bench, Path(options.write))
         return 0
@@ -161,25 +161,12 @@ def show(rows: "Sequence[WorldScore]") -> None:
         console.print(f"family {family}, model {given}")
         console.print(matrix_table(matrix(part)))
         console.print(rate_table(rates(part)))
-        console.print(_split_table(part))
         console.print(_misses(part))
         middle, largest = seconds(part)
         console.print(
             f"closed by what was right, median: {median_closed(part):.3f} (>= 0.9); "
             f"seconds of CPU: {middle:.1f} in the median, {largest:.1f} at most"
         )
-
-
-def _split_table(rows: "Sequence[WorldScore]") -> Table:
-    """Return what is wrong and right by plant and circumstance."""
-    from stiction_studies.blind.scores.world_tally import TESTABLE, splits
-
-    table = Table("", "loops", "claims what is not there", "right, oracle gains 20", box=SIMPLE)
-    for name, part in splits(rows).items():
-        testable = [row for row in part if row.gain() >= TESTABLE]
-        right = f"{sum(row.right for row in testable)} of {len(testable)}"
-        table.add_row(name, str(len(part)), str(sum(row.alarm for row in part)), right)
-    return table
 
 
 def _misses(rows: "Sequence[WorldScore]") -> Table:

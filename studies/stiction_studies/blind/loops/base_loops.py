@@ -18,23 +18,14 @@ LIMITS = (0.0, 100.0)
 
 @dataclasses.dataclass(frozen=True)
 class BaseLoop:
-    """A healthy loop; output i is controlled by valve i.
+    """A healthy loop; output i is controlled by valve i."""
 
-    Attributes:
-        kind: which of :data:`KINDS`.
-        model: what is known of it, without noise, hidden effects or tuning.
-        tunings: one PI controller per output.
-        gains: units of PV per % of its own valve, shape (p,).
-        slow: dominant time constant of every output in samples, shape (p,).
-        delays: dead time from its own valve in samples, shape (p,).
-    """
-
-    kind: str
-    model: LoopModel
-    tunings: tuple[PiTuning, ...]
-    gains: FloatArray
-    slow: FloatArray
-    delays: FloatArray
+    kind: str  # which of :data:`KINDS`
+    model: LoopModel  # what is known of it, without noise, hidden effects or tuning
+    tunings: tuple[PiTuning, ...]  # one PI controller per output
+    gains: FloatArray  # units of PV per % of its own valve, shape (p,)
+    slow: FloatArray  # dominant time constant of every output in samples, shape (p,)
+    delays: FloatArray  # dead time from its own valve in samples, shape (p,)
 
     def with_tunings(self, tunings: tuple[PiTuning, ...]) -> "BaseLoop":
         """Return the same loop under other controllers."""

@@ -38,23 +38,14 @@ _LONGEST = 40.0  # samples, of a hidden lag
 
 @dataclasses.dataclass(frozen=True)
 class Draw:
-    """From what the size of an effect is drawn.
+    """From what the size of an effect is drawn."""
 
-    Attributes:
-        random: source of chance.
-        loop: the healthy loop.
-        target: index of the output, and of its valve, that is hit.
-        scale: 1, or 0.5 for effects of half the size.
-        noise: standard deviation of the white noise on the output.
-        reference: the healthy loop's record under the same set-points and noise.
-    """
-
-    random: np.random.Generator
-    loop: BaseLoop
-    target: int
-    scale: float
-    noise: float
-    reference: Record
+    random: np.random.Generator  # source of chance
+    loop: BaseLoop  # the healthy loop
+    target: int  # index of the output, and of its valve, that is hit
+    scale: float  # 1, or 0.5 for effects of half the size
+    noise: float  # standard deviation of the white noise on the output
+    reference: Record  # the healthy loop's record under the same set-points and noise
 
     def within(self, low: float, high: float) -> float:
         """Return a number between the two, scaled."""
@@ -202,19 +193,12 @@ def _time_shift(draw: Draw) -> Behaviour:
 
 @dataclasses.dataclass(frozen=True)
 class Cause:
-    """One cause: the kind of its place, how it is drawn, and how often.
+    """One cause: the kind of its place, how it is drawn, and how often."""
 
-    Attributes:
-        place: ``valve``, ``process``, ``disturbance``, ``sensor`` or ``data``.
-        draw: returns the behaviour.
-        weight: among all causes.
-        processes: of the base loop; empty for all.
-    """
-
-    place: str
-    draw: Callable[[Draw], Behaviour]
-    weight: float = 1.0
-    processes: tuple[str, ...] = ()
+    place: str  # ``valve``, ``process``, ``disturbance``, ``sensor`` or ``data``
+    draw: Callable[[Draw], Behaviour]  # returns the behaviour
+    weight: float = 1.0  # among all causes
+    processes: tuple[str, ...] = ()  # of the base loop; empty for all
 
     def hide(self, draw: Draw) -> Hidden:
         """Return the effect at the target of ``draw``."""

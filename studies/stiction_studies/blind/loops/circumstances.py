@@ -37,17 +37,11 @@ def pick(random: np.random.Generator, weights: dict[str, float]) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class NoiseSizes:
-    """Noise of every output, units of PV; each of shape (p,).
+    """Noise of every output, units of PV; each of shape (p,)."""
 
-    Attributes:
-        white: on PV.
-        loads: standard deviation at rest of what enters the loop, AR(1) or equation noise.
-        memory: samples that AR(1) noise remembers.
-    """
-
-    white: FloatArray
-    loads: FloatArray
-    memory: FloatArray
+    white: FloatArray  # on PV
+    loads: FloatArray  # standard deviation at rest of what enters the loop, AR(1) or equation noise
+    memory: FloatArray  # samples that AR(1) noise remembers
 
 
 def drawn_noise(random: np.random.Generator, loop: BaseLoop, regime: Regime) -> NoiseSizes:

@@ -37,16 +37,12 @@ HEALTHY = 0.2  # of single loops
 
 @dataclasses.dataclass(frozen=True)
 class BlindLoop:
-    """What the workflow sees of a loop.
+    """What the workflow sees of a loop."""
 
-    Attributes:
-        model: the current model, which lacks what is hidden; it knows the process, and in a
-            loop of one valve the recorded tuning.
-        record: OP, PV and SP; no stem.
-    """
-
+    # the current model, which lacks what is hidden; it knows the process, and in a loop of one
+    # valve the recorded tuning
     model: LoopModel
-    record: Record
+    record: Record  # OP, PV and SP; no stem
 
 
 @dataclasses.dataclass(frozen=True)

@@ -30,42 +30,25 @@ class Hidden:
 
 @dataclasses.dataclass(frozen=True)
 class Regime:
-    """Under which circumstances a loop was recorded.
+    """Under which circumstances a loop was recorded."""
 
-    Attributes:
-        process: kind of the base loop.
-        tuning: ``normal`` or ``tight``.
-        excitation: ``moves`` of the set-point, ``none``, or ``noise``: none, and larger noise.
-        noise: white ``measurement`` noise alone, ``ar1`` noise besides it, or ``equation`` noise.
-        half: whether the effect has half its size.
-    """
-
-    process: str
-    tuning: str
-    excitation: str
-    noise: str
-    half: bool
+    process: str  # kind of the base loop
+    tuning: str  # ``normal`` or ``tight``
+    excitation: str  # ``moves`` of the set-point, ``none``, or ``noise``: none, and larger noise
+    noise: str  # white ``measurement`` noise alone, ``ar1`` noise besides it, or ``equation`` noise
+    half: bool  # whether the effect has half its size
 
 
 @dataclasses.dataclass(frozen=True)
 class Truth:
-    """The answer to one blind loop.
+    """The answer to one blind loop."""
 
-    Attributes:
-        family: one of :data:`FAMILIES`.
-        seed: of the loop.
-        regime: its circumstances.
-        cause: name for tables: ``none``, an effect with its kind of place, or several.
-        hidden: the effects; none in a healthy loop and outside the catalogue.
-        outside: a change that the catalogue does not hold, or an empty text.
-    """
-
-    family: str
+    family: str  # one of :data:`FAMILIES`
     seed: int
-    regime: Regime
-    cause: str
-    hidden: tuple[Hidden, ...]
-    outside: str = ""
+    regime: Regime  # its circumstances
+    cause: str  # name for tables: ``none``, an effect with its kind of place, or several
+    hidden: tuple[Hidden, ...]  # none in a healthy loop and outside the catalogue
+    outside: str = ""  # a change that the catalogue does not hold, or an empty text
 
     @property
     def names(self) -> frozenset[tuple[str, str]]:

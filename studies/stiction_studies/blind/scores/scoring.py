@@ -37,18 +37,12 @@ class Score(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Claim:
-    """One effect that is claimed.
+    """One effect that is claimed."""
 
-    Attributes:
-        named: whether it is the only one; otherwise one of ``names``.
-        names: places and effects that it may be.
-        intervals: by effect, low and high end of its parameters.
-    """
-
-    named: bool
-    names: frozenset[Name]
+    named: bool  # whether it is the only one; otherwise one of ``names``
+    names: frozenset[Name]  # places and effects that it may be
     first: Name
-    intervals: Mapping[str, tuple[float, float]]
+    intervals: Mapping[str, tuple[float, float]]  # by effect, low and high end of its parameters
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,43 +18,26 @@ KEPT = ("verdict", "effects", "alternatives", "process_changes", "noise", "untes
 
 @dataclasses.dataclass(frozen=True)
 class WorldScore:
-    """One loop, judged.
-
-    Attributes:
-        family, given, seed: of the loop.
-        cause: what was hidden, for tables.
-        plant, circumstances: of the loop.
-        oracle: gains in ln L of each hidden effect, over no effect and over the best rival
-            outside its family.
-        wrong: names of what was named and is not there.
-        right: whether all that is hidden is named, or in doubt with its family, and nothing else.
-        silent: whether nothing was found but what the record holds besides.
-        sets: sets that were left in doubt.
-        held: of those, how many hold a truth.
-        said: in words.
-        closed: share of the held-out excess that is gone; NaN where nothing was found.
-        covered: per figure of a hidden effect that was found, whether its interval holds it.
-        seconds: processor time of the workflow.
-        answer: what the workflow said, abridged.
-    """
+    """One loop, judged."""
 
     family: str
     given: str
     seed: int
-    cause: str
+    cause: str  # what was hidden, for tables
     plant: str
     circumstances: tuple[str, ...]
+    # gains in ln L of each hidden effect, over no effect and the best rival outside its family
     oracle: tuple[Mapping[str, Any], ...]
-    wrong: tuple[str, ...]
-    right: bool
-    silent: bool
-    sets: int
-    held: int
-    said: str
-    closed: float
-    covered: Mapping[str, bool]
-    seconds: float
-    answer: Mapping[str, Any]
+    wrong: tuple[str, ...]  # names of what was named and is not there
+    right: bool  # all that is hidden is named, or in doubt with its family, and nothing else
+    silent: bool  # nothing was found but what the record holds besides
+    sets: int  # that were left in doubt
+    held: int  # of those, how many hold a truth
+    said: str  # in words
+    closed: float  # share of the held-out excess that is gone; NaN where nothing was found
+    covered: Mapping[str, bool]  # per figure that was found, whether its interval holds the truth
+    seconds: float  # processor time of the workflow
+    answer: Mapping[str, Any]  # what the workflow said, abridged
 
     @property
     def healthy(self) -> bool:
@@ -114,6 +97,8 @@ def score(
     names = [_names(effect) for effect in loop.hidden]
     there = may.union(*names)
     wrong = tuple(_word(c.first) for c in claims if c.named and c.first not in there)
+    if loop.known == loop.base.plant:
+        wrong += tuple(f"process {change['what']}" for change in answer.get("process_changes", ()))
     sets = [c for c in claims if not c.named]
     gain_is_off = abs(loop.known.gain) != abs(loop.base.plant.gain)
     in_doubt = there | ({(PROCESS, "gain")} if gain_is_off else set())  # a set says no direction

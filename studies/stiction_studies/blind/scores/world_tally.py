@@ -65,16 +65,6 @@ def seconds(rows: Sequence[WorldScore]) -> tuple[float, float]:
     return float(np.median(times)), float(np.max(times))
 
 
-def splits(rows: Sequence[WorldScore]) -> dict[str, list[WorldScore]]:
-    """Return the loops by plant and by circumstance, to see where the workflow misses."""
-    parts: dict[str, list[WorldScore]] = {}
-    for row in rows:
-        told = row.circumstances or ("nothing unusual",)
-        for name in (f"plant {row.plant}", *(f"with {name}" for name in told)):
-            parts.setdefault(name, []).append(row)
-    return dict(sorted(parts.items()))
-
-
 def _part(rows: Sequence[WorldScore]) -> dict[str, Any]:
     middle, largest = seconds(rows)
     closed = median_closed(rows)

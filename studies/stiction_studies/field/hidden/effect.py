@@ -19,25 +19,20 @@ BY_CONTROLLER = ("tuning", "time_shift")
 
 @dataclasses.dataclass(frozen=True)
 class Effect:
-    """One effect.
+    """One effect."""
 
-    Attributes:
-        place: ``KIND:TAG`` or ``data``.
-        name: of the effect, as loop models call it.
-        figures: its parameters by the names of loop models, engineering units; times count from
-            the first sample of the record.
-        law: of friction or of a curve, where there are several; friction by the mechanics of a
-            stem has no figures of a loop model.
-        untold: figures that the record cannot tell, such as an end that is never reached.
-        slack: by how much a figure may be defined otherwise, same units: lags differ by half
-            a sample between continuous time and held signals, ramps by as much at either end.
-    """
-
-    place: str
-    name: str
+    place: str  # ``KIND:TAG`` or ``data``
+    name: str  # of the effect, as loop models call it
+    # its parameters by the names of loop models, engineering units; times count from the first
+    # sample of the record
     figures: Mapping[str, float]
+    # of friction or of a curve, where there are several; friction by the mechanics of a stem has no
+    # figures of a loop model
     law: str = ""
+    # figures that the record cannot tell, such as an end that is never reached
     untold: tuple[str, ...] = ()
+    # by how much a figure may be defined otherwise, same units: lags differ by half a sample
+    # between continuous time and held signals, ramps by as much at either end
     slack: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property

@@ -14,32 +14,20 @@ OFF = (0.03, 0.1)
 
 @dataclasses.dataclass(frozen=True)
 class Noise:
-    """Noise of a loop, engineering units.
+    """Noise of a loop, engineering units."""
 
-    Attributes:
-        white: standard deviation of what the transmitter adds.
-        equation: of what enters the process's equation; 0 is none.
-        coloured: of first-order noise on the output; 0 is none.
-        memory: its time constant, s.
-    """
-
-    white: float
-    equation: float = 0.0
-    coloured: float = 0.0
-    memory: float = 1.0
+    white: float  # standard deviation of what the transmitter adds
+    equation: float = 0.0  # of what enters the process's equation; 0 is none
+    coloured: float = 0.0  # of first-order noise on the output; 0 is none
+    memory: float = 1.0  # its time constant, s
 
 
 @dataclasses.dataclass(frozen=True)
 class Kept:
-    """What transmitter and record add to the output of a loop.
+    """What transmitter and record add to the output of a loop."""
 
-    Attributes:
-        std: standard deviation, engineering units.
-        memory: time constant in samples of the record; 0 is white.
-    """
-
-    std: float
-    memory: float = 0.0
+    std: float  # standard deviation, engineering units
+    memory: float = 0.0  # time constant in samples of the record; 0 is white
 
 
 def off(random: np.random.Generator, plant: Plant, sample_time: float) -> Plant:

@@ -20,25 +20,15 @@ LONGEST_LAG = 40.0  # samples
 
 @dataclasses.dataclass(frozen=True)
 class Draw:
-    """From what the size of an effect is drawn.
+    """From what the size of an effect is drawn."""
 
-    Attributes:
-        random: source of all numbers.
-        base: the healthy loop.
-        reference: its run under the same signals.
-        unit: what 1 % of the valve makes of PV, engineering units.
-        noise: standard deviation of the white noise that PV shows.
-        samples: of the record.
-        scale: factor on the size.
-    """
-
-    random: np.random.Generator
-    base: Base
-    reference: Run
-    unit: float
-    noise: float
-    samples: int
-    scale: float
+    random: np.random.Generator  # source of all numbers
+    base: Base  # the healthy loop
+    reference: Run  # its run under the same signals
+    unit: float  # what 1 % of the valve makes of PV, engineering units
+    noise: float  # standard deviation of the white noise that PV shows
+    samples: int  # of the record
+    scale: float  # factor on the size
 
     def within(self, low: float, high: float) -> float:
         """Return a number between the two, scaled."""
@@ -249,19 +239,12 @@ def _time_shift(draw: Draw) -> Effect:
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """One kind of effect: how it is drawn, and how often.
+    """One kind of effect: how it is drawn, and how often."""
 
-    Attributes:
-        draw: returns the effect.
-        share: among all.
-        first: whether it is one of two that can be told from a load.
-        second: whether it is such a load.
-    """
-
-    draw: Callable[[Draw], Effect]
-    share: float = 1.0
-    first: bool = False
-    second: bool = False
+    draw: Callable[[Draw], Effect]  # returns the effect
+    share: float = 1.0  # among all
+    first: bool = False  # whether it is one of two that can be told from a load
+    second: bool = False  # whether it is such a load
 
 
 KINDS = {

@@ -49,19 +49,12 @@ TURN = 2.0 * math.pi
 
 @dataclasses.dataclass(frozen=True)
 class Gain:
-    """What the oracle gains in ln L by one hidden effect.
+    """What the oracle gains in ln L by one hidden effect."""
 
-    Attributes:
-        effect: place and name.
-        over_none: over no effect.
-        over_rival: over the best effect outside its family.
-        rival: place and name of that.
-    """
-
-    effect: Name
-    over_none: float
-    over_rival: float
-    rival: Name
+    effect: Name  # place and name
+    over_none: float  # over no effect
+    over_rival: float  # over the best effect outside its family
+    rival: Name  # place and name of that
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the JSON mapping."""

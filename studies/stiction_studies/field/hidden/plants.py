@@ -19,24 +19,15 @@ class Plant:
     r"""A linear plant between stem and output, in deviations from rest.
 
     .. math:: G(s) = K \frac{1 + z s}{s^{i} \prod (1 + \tau_j s)} e^{-\theta s}, \quad i = 0, 1
-
-    Attributes:
-        kind: which of :data:`KINDS`.
-        gain: K, engineering units per %; per % and second of an integrator.
-        lags: τ, s.
-        lead: z, s; 0 is none, below 0 an answer that begins the wrong way.
-        dead_time: θ, s.
-        integrating: whether i is 1.
-        decay: share that an integrator loses per second.
     """
 
-    kind: str
-    gain: float
-    lags: tuple[float, ...]
-    lead: float = 0.0
-    dead_time: float = 0.0
-    integrating: bool = False
-    decay: float = 0.0
+    kind: str  # which of :data:`KINDS`
+    gain: float  # K, engineering units per %; per % and second of an integrator
+    lags: tuple[float, ...]  # τ, s
+    lead: float = 0.0  # z, s; 0 is none, below 0 an answer that begins the wrong way
+    dead_time: float = 0.0  # θ, s
+    integrating: bool = False  # whether i is 1
+    decay: float = 0.0  # share that an integrator loses per second
 
     @property
     def slow(self) -> float:

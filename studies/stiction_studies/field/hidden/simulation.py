@@ -30,19 +30,12 @@ CURVES = {"": kernels.EXPONENTIAL, "quadratic": kernels.QUADRATIC, "in a line": 
 
 @dataclasses.dataclass(frozen=True)
 class Signals:
-    """What acts on a loop from outside at each sample, the lead included, shape (K,) each.
+    """What acts on a loop from outside at each sample, the lead included, shape (K,) each."""
 
-    Attributes:
-        set_point: engineering units.
-        output: what adds to the output, the noise of the process.
-        reading: what adds to the transmitter's reading, its noise.
-        by_hand: OP where the loop is in manual, %; NaN elsewhere.
-    """
-
-    set_point: FloatArray
-    output: FloatArray
-    reading: FloatArray
-    by_hand: FloatArray
+    set_point: FloatArray  # engineering units
+    output: FloatArray  # what adds to the output, the noise of the process
+    reading: FloatArray  # what adds to the transmitter's reading, its noise
+    by_hand: FloatArray  # OP where the loop is in manual, %; NaN elsewhere
 
     def __len__(self) -> int:
         return len(self.set_point)
@@ -50,38 +43,23 @@ class Signals:
 
 @dataclasses.dataclass(frozen=True)
 class Base:
-    """A healthy loop.
+    """A healthy loop."""
 
-    Attributes:
-        plant: in continuous time.
-        tuning: of its PI controller.
-        sample_time: s.
-        scan: samples of a scan.
-        winding: whether the integral part goes on at the limits of OP.
-    """
-
-    plant: Plant
-    tuning: Tuning
-    sample_time: float
-    scan: int
-    winding: bool
+    plant: Plant  # in continuous time
+    tuning: Tuning  # of its PI controller
+    sample_time: float  # s
+    scan: int  # samples of a scan
+    winding: bool  # whether the integral part goes on at the limits of OP
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """What happened at each sample, the lead included, shape (K,) each.
+    """What happened at each sample, the lead included, shape (K,) each."""
 
-    Attributes:
-        op: %.
-        pv: as read, engineering units.
-        stem: where it stands at the end of the sample, %.
-        clean: output before the sensor.
-    """
-
-    op: FloatArray
-    pv: FloatArray
-    stem: FloatArray
-    clean: FloatArray
+    op: FloatArray  # %
+    pv: FloatArray  # as read, engineering units
+    stem: FloatArray  # where it stands at the end of the sample, %
+    clean: FloatArray  # output before the sensor
 
 
 def run(base: Base, signals: Signals, effects: Iterable[Effect] = ()) -> Run:

@@ -35,39 +35,25 @@ SAMPLES = (1200, 2000)
 
 @dataclasses.dataclass(frozen=True)
 class Surroundings:
-    """What is drawn before any number.
+    """What is drawn before any number."""
 
-    Attributes:
-        plant: kind of its equations.
-        tight: whether the loop is tuned near its limit.
-        excitation: ``moves`` or ``ramps`` of the set-point, ``open_loop``: OP moved by hand,
-            ``quiet``: nothing but noise, three times as large.
-        noise: white ``measurement`` noise, ``equation`` noise beside little of it, or
-            ``coloured`` noise beside it.
-        keeping: what becomes of the values in the record.
-        scan: samples of a scan of the controller; below 1 the record leaves scans out.
-        winding: whether the integral part goes on at the limits of OP.
-        declared: whether the model says what noise there is.
-        tuning_known: whether the model holds the tuning.
-        set_point_kept: whether the record has SP.
-        stem_recorded: whether the record has the stem.
-        half: whether the effect has half its size.
-        samples: of the record.
-    """
-
-    plant: str
-    tight: bool
+    plant: str  # kind of its equations
+    tight: bool  # whether the loop is tuned near its limit
+    # ``moves`` or ``ramps`` of the set-point, ``open_loop``: OP moved by hand, ``quiet``: nothing
+    # but noise, three times as large
     excitation: str
+    # white ``measurement`` noise, ``equation`` noise beside little of it, or ``coloured`` noise
+    # beside it
     noise: str
-    keeping: str
-    scan: float
-    winding: bool
-    declared: bool
-    tuning_known: bool
-    set_point_kept: bool
-    half: bool
-    samples: int
-    stem_recorded: bool = False
+    keeping: str  # what becomes of the values in the record
+    scan: float  # samples of a scan of the controller; below 1 the record leaves scans out
+    winding: bool  # whether the integral part goes on at the limits of OP
+    declared: bool  # whether the model says what noise there is
+    tuning_known: bool  # whether the model holds the tuning
+    set_point_kept: bool  # whether the record has SP
+    half: bool  # whether the effect has half its size
+    samples: int  # of the record
+    stem_recorded: bool = False  # whether the record has the stem
 
     @property
     def closed(self) -> bool:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from stiction_studies.blind.scores.world_scores import WorldScore, score
-from stiction_studies.blind.scores.world_tally import median_closed, rates, report, splits
+from stiction_studies.blind.scores.world_tally import median_closed, rates, report
 from stiction_studies.field.hidden import Effect, HiddenLoop, hidden_loop
 from stiction_studies.field.hidden.effect import LOAD, OUTPUT, PROCESS, SENSOR, VALVE
 from stiction_studies.field.hidden.oracle import Gain
@@ -139,6 +139,9 @@ def test_process_changes_are_right_in_the_true_direction(loop: HiddenLoop) -> No
     weaker = dataclasses.replace(plant, gain=plant.gain / 1.1)
     larger, smaller = (effect(PROCESS, "gain", factor=f) for f in (1.1, 0.9))
     assert not judged(loop, (), said(larger), known=weaker).alarm
+    changed = said() | {"process_changes": [{"what": "gain"}]}
+    assert judged(loop, (), changed, known=plant).wrong == ("process gain",)
+    assert judged(loop, (), changed, known=weaker).wrong == ()
     assert judged(loop, (), said(smaller), known=weaker).alarm
     left_open = ((PROCESS, "gain"), (VALVE, "characteristic"))
     assert judged(loop, (), said(loose=left_open, verdict="ambiguous"), known=weaker).held == 1
@@ -192,12 +195,3 @@ def test_rates_count_what_they_say(loop: HiddenLoop) -> None:
     assert median_closed(rows) == pytest.approx(0.97)
     (name,) = report(rows)["parts"]
     assert name == "single, exact"
-
-
-def test_rows_are_split_by_plant_and_circumstance(loop: HiddenLoop) -> None:
-    rows = [judged(loop, (FRICTION,), said()), judged(loop, (), said())]
-    parts = splits(rows)
-    assert parts["plant heater"] == rows
-    assert {name.partition(" ")[0] for name in parts} == {"plant", "with"}
-    bare = [dataclasses.replace(row, circumstances=()) for row in rows]
-    assert splits(bare)["with nothing unusual"] == bare
