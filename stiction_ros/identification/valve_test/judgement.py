@@ -12,7 +12,7 @@ from stiction_ros.identification.result import VerdictKind
 from stiction_ros.identification.valve_test.frictions import SMALLEST, Frictions
 from stiction_ros.identification.valve_test.likelihood import OWN_ERROR, log_sum
 from stiction_ros.identification.valve_test.search import Explanation, Trial
-from stiction_ros.identification.valve_test.steps import SHORTEST, Steps
+from stiction_ros.identification.valve_test.steps import FEWEST, SHORTEST, Steps
 
 DECIDED = 0.95
 """Probability from which on a verdict is given, either way."""
@@ -144,9 +144,10 @@ def judged(op: FloatArray, pv: FloatArray, gain: float | None = None) -> Judgeme
     probability = float(weights[counts].sum())
     moved = 1.0 - no_link - float(weights[~frictions.moved].sum())
     verdict = VerdictKind.UNDECIDED
-    if 1.0 - no_link - probability >= DECIDED:
+    enough = len(trial.steps.rows) >= FEWEST
+    if enough and 1.0 - no_link - probability >= DECIDED:
         verdict = VerdictKind.HEALTHY
-    elif probability >= DECIDED:
+    elif enough and probability >= DECIDED:
         even = float(cells[frictions.even].sum())
         verdict = VerdictKind.BACKLASH if even >= DECIDED else VerdictKind.STICKY
     static = _spread(frictions.static, cells, frictions.even)

@@ -12,7 +12,8 @@ SHORTEST = 7
 than they can take up. Controllers that a historian samples faster than they scan hold OP, too."""
 
 FEWEST = 5
-"""Steps of a test, at least: more than the numbers of a PI law, which could explain fewer."""
+"""Steps of a test, at least: more than the numbers of a PI law, which could explain fewer, as could
+noise that lasts from one step to the next."""
 
 
 @dataclasses.dataclass(frozen=True)
