@@ -43,8 +43,8 @@ if TYPE_CHECKING:
         LinearIdentification as LinearIdentification,
     )
     from stiction_ros.identification.methods import identify as identify
-    from stiction_ros.identification.result.identification import Identification as Identification
-    from stiction_ros.identification.result.identification import VerdictKind as VerdictKind
+    from stiction_ros.identification.result import Identification as Identification
+    from stiction_ros.identification.result import VerdictKind as VerdictKind
     from stiction_ros.intake.intake import read as read
     from stiction_ros.intake.intake_options import CsvColumns as CsvColumns
     from stiction_ros.loop.closed_loop import simulate as simulate
@@ -74,7 +74,7 @@ _HOMES = {
     "GapOptions": "discrepancy.gap_options",
     "GapVerdict": "discrepancy.decision.decide",
     "HeStiction": "effects.friction.he",
-    "Identification": "identification.result.identification",
+    "Identification": "identification.result",
     "IdentificationOptions": "identification.identification_options",
     "InputError": "errors",
     "LinearIdentification": "identification.linear.result",
@@ -87,7 +87,7 @@ _HOMES = {
     "Scenario": "online.session",
     "SetPoints": "loop.set_points",
     "StepResult": "control.result",
-    "VerdictKind": "identification.result.identification",
+    "VerdictKind": "identification.result",
     "find_config": "config_files",
     "find_gap": "discrepancy.workflow:find_discrepancy",
     "fit_linear": "identification.linear.fit",

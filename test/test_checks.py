@@ -19,7 +19,7 @@ from stiction_ros import (
 from stiction_ros.checks import LONGEST, number, one_of, shown
 from stiction_ros.control.result import ControlMode
 from stiction_ros.errors import InputError
-from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.friction import find_law
 from stiction_ros.identification.linear.data import LinearKind
 from stiction_ros.loop.yaml_reading import Section
 from stiction_ros.settings import from_mapping

@@ -139,8 +139,7 @@ def _write_model(record: "Record", found: "Identification", target: str) -> None
 
 
 def _print(document: Mapping[str, Any], found: "Identification") -> None:
-    from stiction_ros.identification.answer.summary import rows
-    from stiction_ros.identification.answer.words import cycle, materiality, next_step, why
+    from stiction_ros.identification.answer.summary import cycle, materiality, next_step, rows, why
 
     console = Console()
     table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
@@ -181,8 +180,7 @@ def _print(document: Mapping[str, Any], found: "Identification") -> None:
 
 def _print_figures(found: "Identification") -> None:
     """Print the figures of each valve, and what each adds to the log odds of friction."""
-    from stiction_ros.identification.judgement.figures import definitions
-    from stiction_ros.identification.judgement.probability import contributions
+    from stiction_ros.identification.judgement import contributions, definitions
 
     console = Console()
     for valve in found.valves:
@@ -206,7 +204,7 @@ def _print_figures(found: "Identification") -> None:
 
 def _further(found: "Identification") -> dict[str, str]:
     """Return the heads of the columns of the law's further parameters, by their keys."""
-    from stiction_ros.identification.friction.grid import find_law
+    from stiction_ros.identification.friction import find_law
 
     heads = {}
     for valve in found.valves:

@@ -152,7 +152,7 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     # Judging takes compiled code, which other commands do not wait for.
-    from stiction_ros.identification.friction.grid import find_law
+    from stiction_ros.identification.friction import find_law
     from stiction_ros.identification.identification_options import IdentificationOptions
     from stiction_ros.intake.intake import loops, strange_files
     from stiction_ros.survey.entry import SurveyOptions

@@ -2,8 +2,8 @@
 
 from stiction_ros.control.controller import MpcController
 from stiction_ros.control.design import ControlDesign, History
-from stiction_ros.control.jump_form import FrictionSpread
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
+from stiction_ros.effects.friction.stiction import FrictionSpread
 
 __all__ = [
     "ControlDesign",

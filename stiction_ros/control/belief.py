@@ -1,11 +1,32 @@
-"""Where the controller believes the stem of a sticky valve to be, and how surely."""
+"""What a controller believes: the laws of its valves, where their stems are, and how surely."""
+
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from stiction_ros.control.jump_form import FrictionSpread, JumpForm
-from stiction_ros.effects.behaviour import Memory
+from stiction_ros.effects import Behaviour, behaviours
+from stiction_ros.effects.behaviour import FloatArray, Memory
+from stiction_ros.effects.friction.stiction import FrictionSpread, JumpForm, Stiction
+from stiction_ros.errors import InputError
 
 STARTS = 17  # stem positions followed while the true one is unknown
+
+
+def jump_form(law: Behaviour) -> JumpForm:
+    """Return the jump form of a law of stiction; InputError for a law that has none."""
+    form = law.jump_form() if isinstance(law, Stiction) else None
+    if form is None:
+        known = [kind.law for kind in behaviours() if kind.law and _jumps(kind)]
+        raise InputError(
+            f"{law.title()} has no jump form, so no OP can be planned for it",
+            where="friction law",
+            fix=f"give the same friction by one of {', '.join(known)}",
+        )
+    return form
+
+
+def _jumps(kind: type[Behaviour]) -> bool:
+    return issubclass(kind, Stiction) and kind.jump_form is not Stiction.jump_form
 
 
 class ValveBelief:
@@ -75,3 +96,72 @@ class ValveBelief:
         self.form = self.form.raised(static_friction)
         self.spread = None
         self.settle(stem)
+
+
+class ValveBeliefs(Sequence[ValveBelief | None]):
+    """The belief in each valve, in their order; None for one that is taken to be healthy."""
+
+    def __init__(
+        self,
+        frictions: Sequence[Behaviour | None],
+        spreads: Sequence[FrictionSpread | None],
+        limits: FloatArray,
+    ) -> None:
+        """Take what is given for each of the m valves, with ``limits`` (m, 2) of their stems."""
+        self._beliefs = tuple(
+            None if law is None else ValveBelief(jump_form(law), spread)
+            for law, spread in zip(frictions, spreads, strict=True)
+        )
+        self._limits = limits.tolist()
+
+    def __len__(self) -> int:
+        return len(self._beliefs)
+
+    def __getitem__(self, index: int) -> ValveBelief | None:  # type: ignore[override]
+        return self._beliefs[index]
+
+    @property
+    def sticky(self) -> Iterator[tuple[int, ValveBelief]]:
+        """The valves that are taken to be sticky, with their numbers."""
+        return ((j, one) for j, one in enumerate(self._beliefs) if one is not None)
+
+    @property
+    def frictions(self) -> tuple[Behaviour | None, ...]:
+        """Friction believed in now, per valve."""
+        return tuple(None if one is None else one.form.law for one in self._beliefs)
+
+    @property
+    def spreads(self) -> tuple[FrictionSpread | None, ...]:
+        """Half-widths of the intervals of the frictions, per valve, None where unknown."""
+        return tuple(None if one is None else one.spread for one in self._beliefs)
+
+    @property
+    def forms(self) -> tuple[JumpForm | None, ...]:
+        """Jump forms, per valve."""
+        return tuple(None if one is None else one.form for one in self._beliefs)
+
+    def intervals(self, stem: FloatArray) -> FloatArray:
+        """Return lowest and highest stem, (m, 2), %, that the past allows; ``stem`` if healthy."""
+        found = np.column_stack([stem, stem])
+        for j, belief in self.sticky:
+            found[j] = belief.interval
+        return found
+
+    def start(self, op: FloatArray) -> None:
+        """Begin with OP at rest at ``op`` (m,), %, each stem anywhere within f_S of it."""
+        for j, belief in self.sticky:
+            belief.start(float(op[j]), *self._limits[j])
+
+    def apply_op(self, op: FloatArray) -> FloatArray:
+        """Apply ``op`` (m,), %, for one sample and return the stems, shape (m,), %."""
+        stem = np.array(op, dtype=float)
+        for j, belief in self.sticky:
+            stem[j] = belief.apply_op(float(op[j]))
+        return stem
+
+    def expected(self, op: FloatArray) -> FloatArray:
+        """Return the stems, shape (m,), %, that :meth:`apply_op` would bring about."""
+        stem = np.array(op, dtype=float)
+        for j, belief in self.sticky:
+            stem[j] = belief.expected(float(op[j]))
+        return stem

@@ -7,18 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.checks import of_kind, one_of
-from stiction_ros.control.beliefs import ValveBeliefs
+from stiction_ros.control.belief import ValveBeliefs
 from stiction_ros.control.design import ControlDesign, History
-from stiction_ros.control.jump_form import FrictionSpread
 from stiction_ros.control.modes import formulation_of
 from stiction_ros.control.observer import Observer
-from stiction_ros.control.passage import Passage
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
-from stiction_ros.control.slip_check import SlipCheck
+from stiction_ros.control.slip_check import Passage, SlipCheck
 from stiction_ros.control.strategies import Proposal, Situation, Strategies
 from stiction_ros.control.target import Target, TargetSelector
 from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
+from stiction_ros.effects.friction.stiction import FrictionSpread
 
 CUT = 1e-6  # %; what a rate limit takes off a move is told from here on
 

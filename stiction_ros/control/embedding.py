@@ -6,18 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.control.beliefs import ValveBeliefs
+from stiction_ros.control.belief import ValveBeliefs, jump_form
 from stiction_ros.control.certificate import Certificate, CertificateStatus, FreeJumps, certify
 from stiction_ros.control.embedding_problem import EmbeddingProblem, JumpPattern, StickyState
 from stiction_ros.control.formulation import Formulation
 from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonWeights
 from stiction_ros.control.horizon_qp import HorizonSolution
-from stiction_ros.control.jump_form import FrictionSpread, JumpForm, jump_form
 from stiction_ros.control.pattern_bounds import PatternBounds
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.control.target import Target
 from stiction_ros.control.unaware import predicted_outputs
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
+from stiction_ros.effects.friction.stiction import FrictionSpread, JumpForm
 from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
 
@@ -72,7 +72,7 @@ class EmbeddingMpc(Formulation):
     r"""The controller that knows the friction, written in the stem position.
 
     Under He's law (4), and others of the same
-    :class:`~stiction_ros.control.jump_form.JumpForm`, a stem either stays or jumps by at
+    :class:`~stiction_ros.control.belief.JumpForm`, a stem either stays or jumps by at
     least J:
 
     .. math::

@@ -2,7 +2,7 @@
 
 import abc
 
-from stiction_ros.control.beliefs import ValveBeliefs
+from stiction_ros.control.belief import ValveBeliefs
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.control.target import Target
 from stiction_ros.effects.behaviour import FloatArray

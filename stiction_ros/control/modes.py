@@ -2,13 +2,12 @@
 
 import math
 
-from stiction_ros.control.beliefs import ValveBeliefs
+from stiction_ros.control.belief import ValveBeliefs
 from stiction_ros.control.design import ControlDesign
 from stiction_ros.control.embedding import EmbeddingMpc
 from stiction_ros.control.formulation import Formulation
-from stiction_ros.control.inversion import InversionMpc
 from stiction_ros.control.result import ControlMode
-from stiction_ros.control.unaware import UnawareMpc
+from stiction_ros.control.unaware import InversionMpc, UnawareMpc
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 

@@ -16,10 +16,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.control.formulation import Formulation
-from stiction_ros.control.jump_form import JumpForm
 from stiction_ros.control.result import ControlMode, Plan, StepStatus
 from stiction_ros.control.target import Target
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.friction.stiction import JumpForm
 
 
 @dataclasses.dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.result.identification import ValveEstimate, VerdictKind
+from stiction_ros.identification.result import ValveEstimate, VerdictKind
 from stiction_ros.loop.repeated_loops import Equations
 from stiction_ros.signals.recovered_controller import RecoveredController
 

@@ -24,15 +24,15 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.control import ControlMode, FrictionSpread, MpcController
+from stiction_ros.control.belief import jump_form
 from stiction_ros.control.design import ControlDesign, History
-from stiction_ros.control.jump_form import jump_form
 from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.gain.draws import Draws
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
-from stiction_ros.identification.friction.grid import find_law
-from stiction_ros.identification.result.identification import ValveEstimate
+from stiction_ros.identification.friction import find_law
+from stiction_ros.identification.result import ValveEstimate
 from stiction_ros.loop import LoopModel
 
 MARGIN = 0.3

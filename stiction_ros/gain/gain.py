@@ -13,10 +13,8 @@ from stiction_ros.gain.draws import DRAWS, SEED, Draws
 from stiction_ros.gain.embedding import EmbeddingDesign, embedded
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
-from stiction_ros.gain.retuning import UNCHANGED, best_tuning
-from stiction_ros.gain.swiftness import FASTEST, times_as_fast
-from stiction_ros.identification.result.cause import CauseKind
-from stiction_ros.identification.result.identification import Identification
+from stiction_ros.gain.retuning import FASTEST, UNCHANGED, best_tuning, times_as_fast
+from stiction_ros.identification.result import CauseKind, Identification
 from stiction_ros.records.record import Record
 
 AGREED = 0.25

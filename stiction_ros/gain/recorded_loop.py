@@ -42,13 +42,8 @@ from stiction_ros.identification.closed_loop.scaled_loop import (
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.outside_waves import outside_wave
 from stiction_ros.identification.evidence.rates import LEAST_ROWS, RATES
-from stiction_ros.identification.friction.grid import find_law, simulate
-from stiction_ros.identification.result.identification import (
-    FitStatus,
-    Identification,
-    ValveEstimate,
-    VerdictKind,
-)
+from stiction_ros.identification.friction import find_law, simulate
+from stiction_ros.identification.result import FitStatus, Identification, ValveEstimate, VerdictKind
 from stiction_ros.loop.linear_loops import Controllers, Process
 from stiction_ros.loop.repeated_loops import (
     Control,

@@ -2,7 +2,7 @@
 
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.methods import METHODS, identify
-from stiction_ros.identification.result.identification import (
+from stiction_ros.identification.result import (
     FitStatus,
     Identification,
     OutputModel,

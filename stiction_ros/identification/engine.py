@@ -9,12 +9,11 @@ import numpy as np
 
 from stiction_ros.identification.closed_loop.closed_loop import close_loop
 from stiction_ros.identification.closed_loop.explanation import explained
-from stiction_ros.identification.exact.long_records import carried_over, liveliest_part
-from stiction_ros.identification.exact.search import SearchOutcome, improve, search
+from stiction_ros.identification.conclusion import conclude, evidence, is_deadband, judge
+from stiction_ros.identification.exact.intervals import friction_intervals
+from stiction_ros.identification.exact.neighbourhood import REJECTED, refine
+from stiction_ros.identification.exact.search import SearchOutcome, comb, improve, search
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.inference.conclusion import Findings, conclude
-from stiction_ros.identification.inference.intervals import friction_intervals
-from stiction_ros.identification.inference.verdict import evidence, is_deadband, judge
 from stiction_ros.identification.problem.models import (
     Data,
     Model,
@@ -22,25 +21,27 @@ from stiction_ros.identification.problem.models import (
     linear_model,
     refit,
     settle_delays,
+    stem_of,
 )
 from stiction_ros.identification.problem.output_error import Orders
-from stiction_ros.identification.problem.preparation import prepare, windows
-from stiction_ros.identification.result.identification import (
+from stiction_ros.identification.problem.preparation import liveliest_part, prepare, windows
+from stiction_ros.identification.result import (
     Identification,
     OrderRow,
+    Stability,
     ValveEstimate,
     VerdictKind,
+    halves,
 )
-from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.identification.side_by_side import at_once, together
-from stiction_ros.identification.switching.patterns import require_cells
+from stiction_ros.identification.switching import require_cells
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
 
 
 def identify_exact(
-    record: Record, options: IdentificationOptions | None = None, progress: Progress | None = None
+    record: Record, options: IdentificationOptions, progress: Progress | None = None
 ) -> Identification:
     """Identify friction and linear dynamics of every valve and output of a record.
 
@@ -48,7 +49,7 @@ def identify_exact(
 
     Args:
         record: what was measured.
-        options: None for the defaults.
+        options: of the search.
         progress: called with the share done, 0 to 1.
 
     Raises:
@@ -56,7 +57,6 @@ def identify_exact(
             patterns cannot be enumerated.
     """
     begun = time.perf_counter()
-    options = options or IdentificationOptions()
     report = progress or (lambda share: None)
     data = prepare(record, options)
     report(0.02)
@@ -73,7 +73,7 @@ def identify_exact(
     report(1.0)
     exact = [certificate(valve) for valve in valves if valve.static_friction > 0.0]
     told = (*ambiguities(record, delays, outcome.rivals), *exact)
-    plain = conclude(record, data, Findings(final, valves, table, told), 0.0)
+    plain = conclude(record, data, final, valves, table, told)
     answer = explained(record, plain, close_loop(record, plain))
     return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
 
@@ -134,6 +134,31 @@ def judged_valves(
         )
         valves.append(valve)
     return tuple(valves), model
+
+
+def carried_over(data: Data, linear: Model, found: Model, orders: Orders) -> Model:
+    """Return the best model of the whole record near the friction found in a part of it.
+
+    Args:
+        linear: the whole record's model without friction.
+        found: the part's model; its friction and delays are taken.
+    """
+    stems = linear.stems.copy()
+    sticky = [int(j) for j in np.flatnonzero(found.friction[:, 0])]
+    for j in sticky:
+        stems[j] = stem_of(data, j, found.friction[j], 0.0)
+    model = dataclasses.replace(
+        linear,
+        friction=found.friction,
+        start=np.zeros(len(stems)),
+        stems=stems,
+        delays=found.delays,
+    )
+    model = refit(data, model, orders, warm=False)
+    for j in sticky:
+        model = comb(data, model, orders, j)
+        model, _ = refine(data, model, orders, j, REJECTED)
+    return min(linear, model, key=lambda candidate: candidate.loss)
 
 
 def choose(

@@ -14,18 +14,18 @@ from stiction_ros.checks import of_kind
 from stiction_ros.errors import InputError
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
-from stiction_ros.identification.result.identification import Identification
+from stiction_ros.identification.result import Identification
 from stiction_ros.identification.side_by_side import at_once
 from stiction_ros.intake.intake import record_of
 from stiction_ros.one_thread import one_thread
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
-Method = Callable[[Record, IdentificationOptions | None, Progress | None], Identification]
+Method = Callable[[Record, IdentificationOptions, Progress | None], Identification]
 
 
 def _exact(
-    record: Record, options: IdentificationOptions | None, progress: Progress | None
+    record: Record, options: IdentificationOptions, progress: Progress | None
 ) -> Identification:
     from stiction_ros.identification.engine import identify_exact  # slow to import
 
@@ -33,7 +33,7 @@ def _exact(
 
 
 def _by_evidence(
-    record: Record, options: IdentificationOptions | None, progress: Progress | None
+    record: Record, options: IdentificationOptions, progress: Progress | None
 ) -> Identification:
     from stiction_ros.identification.evidence.engine import identify_by_evidence  # slow to import
 

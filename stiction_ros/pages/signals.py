@@ -8,9 +8,8 @@ from pathlib import Path
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
-from stiction_ros.identification.answer.summary import as_html
-from stiction_ros.identification.answer.words import cause_of
-from stiction_ros.identification.result.cause import CauseKind
+from stiction_ros.identification.answer.summary import as_html, cause_of
+from stiction_ros.identification.result import CauseKind
 from stiction_ros.intake.intake import record_of
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import MOST, SCRIPT, Curve, against, over_time

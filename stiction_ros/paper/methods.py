@@ -25,7 +25,7 @@ def identify(
     if options.method == "grid":
         from stiction_ros.paper.grid_search import identify_by_grid as search
     elif options.method == "nlp_printed":
-        from stiction_ros.paper.programme.printed import identify_as_printed as search
+        from stiction_ros.paper.programme.nlp import identify_as_printed as search
     else:
         from stiction_ros.paper.programme.nlp import identify_by_programme as search
     return search(record, options, progress)

@@ -1,4 +1,4 @@
-"""What the paper's two methods share: checks, delays to try, and the result."""
+"""What the paper's two methods share: checks, Δu, delays to try, and the result."""
 
 import dataclasses
 import itertools
@@ -10,20 +10,85 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification.identification_options import limited
 from stiction_ros.identification.linear.data import nrmse_fit
 from stiction_ros.identification.problem import input_checks
-from stiction_ros.identification.result import identification
+from stiction_ros.identification.result import FitStatus, OutputModel, ValveEstimate, VerdictKind
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification, SearchLog, SolvedStart
 from stiction_ros.paper.smoothed_laws import smooth_law
-from stiction_ros.paper.sustained_oscillation import sustained_oscillations
 from stiction_ros.records.record import Record
 from stiction_ros.signals.arx_fit import ArxFit, ArxOrders, Delays, fit_arx
+from stiction_ros.signals.holds import holds
 
+SETTLED = 0.5  # share of a hold after which OP has settled
+REPEATED = 0.5  # of the larger of two spans that come from the same cycle
+ALIKE = 0.9
+PARTS = 8
+MIN_PART = 4  # samples of a part that is looked at
 DEFAULT_ORDER = 3
 MIN_SAMPLES = 60
 NO_EVIDENCE = (
     "this method gives the one best point: no interval and no verdict; as interval the whole "
     "range of friction stands, of which it rejects nothing"
 )
+
+
+@dataclasses.dataclass(frozen=True)
+class SustainedOscillation:
+    """Δu of one valve, to which Section 3.2 limits friction, and what speaks for it.
+
+    A record is cut where a set-point moves, else into eight parts. Of each hold the second half
+    counts. Δu is the largest span that another one reaches by half: what comes once is a transient.
+    """
+
+    valve: str  # tag
+    span: float  # Δu, %
+    sustained: bool  # whether another part repeats it; False where the span of OP stands in
+    whole: float  # span of OP over the record, %
+    parts: tuple[tuple[int, int], ...]  # first row and one past the last of every part looked at
+    spans: tuple[float, ...]  # of OP in each part, %
+
+    @property
+    def alike(self) -> int:
+        """Number of parts whose span is Δu within a tenth."""
+        return sum(ALIKE * self.span <= span <= self.span for span in self.spans)
+
+    def __str__(self) -> str:
+        """Return the evidence in one line."""
+        if not self.sustained:
+            return f"Δu of {self.valve} {self.span:.3g} %: no oscillation repeats, OP's whole span"
+        return (
+            f"Δu of {self.valve} {self.span:.3g} %, within a tenth in {self.alike} of "
+            f"{len(self.spans)} parts; OP spans {self.whole:.3g} %"
+        )
+
+
+def sustained_oscillations(record: Record) -> tuple[SustainedOscillation, ...]:
+    """Return Δu of every valve of a record, with its evidence."""
+    parts = _parts(record)
+    return tuple(
+        _of_valve(tag, op, parts) for tag, op in zip(record.valves, record.op.T, strict=True)
+    )
+
+
+def _parts(record: Record) -> tuple[tuple[int, int], ...]:
+    """Return the settled half of every hold, or equal parts where no set-point moves."""
+    rows = [] if record.sp is None else holds(record.sp)
+    if len(rows) < 2:
+        edges = np.linspace(0, len(record), PARTS + 1).astype(int).tolist()
+        rows = list(itertools.pairwise(edges))
+    else:
+        rows = [(begin + int(SETTLED * (end - begin)), end) for begin, end in rows]
+    return tuple((begin, end) for begin, end in rows if end - begin >= MIN_PART)
+
+
+def _of_valve(tag: str, op: FloatArray, parts: tuple[tuple[int, int], ...]) -> SustainedOscillation:
+    spans = tuple(float(np.ptp(op[begin:end])) for begin, end in parts)
+    ordered = sorted(spans, reverse=True)
+    repeated = [
+        large for large, small in itertools.pairwise(ordered) if small >= REPEATED * large > 0.0
+    ]
+    whole = float(np.ptp(op))
+    span = repeated[0] if repeated else whole
+    return SustainedOscillation(tag, span, bool(repeated), whole, parts, spans)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -143,7 +208,7 @@ def result(
         if delay == high > low
     ]
     return PaperIdentification(
-        status=identification.FitStatus.NO_MODEL if answer.reason else identification.FitStatus.OK,
+        status=FitStatus.NO_MODEL if answer.reason else FitStatus.OK,
         reason=answer.reason,
         method=options.method,
         samples=len(record),
@@ -169,13 +234,13 @@ def valve_estimate(
     stem: FloatArray,
     limit: float,
     law: str = "he",
-) -> identification.ValveEstimate:
+) -> ValveEstimate:
     """Return a point estimate: undecided, with intervals from 0 to f_max, as f_D ≤ f_S."""
     static, dynamic = float(friction[0]), float(min(friction[0], friction[1]))
     moves = int(np.count_nonzero(np.abs(np.diff(stem)) > 1e-9 * max(limit, 1e-300)))
-    return identification.ValveEstimate(
+    return ValveEstimate(
         name=record.valves[valve],
-        verdict=identification.VerdictKind.UNDECIDED,
+        verdict=VerdictKind.UNDECIDED,
         law=law,
         static_friction=static,
         static_interval=(0.0, max(limit, static)),
@@ -190,14 +255,14 @@ def valve_estimate(
 
 def output_model(
     record: Record, output: int, fit: ArxFit, stems: FloatArray, orders: ArxOrders
-) -> identification.OutputModel:
+) -> OutputModel:
     """Return one output's model with its one-step and its free-run fit."""
     y = record.pv[:, output]
     first, tail = orders.first, y[orders.first :]
     past, inputs = orders.of_output(output, len(stems))
     free_parameters = past + sum(inputs) + 1
     variance = fit.squared_error / max(len(tail) - free_parameters, 1)
-    return identification.OutputModel(
+    return OutputModel(
         name=record.outputs[output],
         a=tuple(map(float, fit.a[:past])),
         b={

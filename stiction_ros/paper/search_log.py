@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Any
 
-from stiction_ros.identification.result.identification import Identification
+from stiction_ros.identification.result import Identification
 from stiction_ros.signals.arx_fit import Delays
 
 CAPPED = "Maximum_Iterations_Exceeded"

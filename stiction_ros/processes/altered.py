@@ -4,8 +4,7 @@ import numpy as np
 
 from stiction_ros.effects import Behaviour, Filter, FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.processes.linear import LinearModel
-from stiction_ros.processes.process import Process
+from stiction_ros.processes.process import LinearModel, Process
 
 
 class AlteredProcess(Process):

@@ -1,13 +1,73 @@
-"""What every process is: stem positions in, process variables out, one sample at a time."""
+"""What every process is, and the discrete linear model in deviations which it may have."""
 
 import dataclasses
 import enum
+import itertools
 from abc import ABC, abstractmethod
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.processes.linear import LinearModel
+from stiction_ros.errors import InputError
+from stiction_ros.signals.state_space import responses
+
+
+@dataclasses.dataclass(frozen=True)
+class LinearModel:
+    r"""Linear dynamics about an operating point, equation (2) without the valves.
+
+    .. math::
+        \xi_{k+1} &= A \xi_k + B (\chi_k - \chi_0) + E w_k + g \\
+        y_k &= C \xi_k + y_0
+
+    Raises:
+        InputError: shapes that do not fit together, or values that are not finite.
+    """
+
+    a: FloatArray  # a, b, c: shapes (n, n), (n, m), (p, n)
+    b: FloatArray
+    c: FloatArray
+    e: FloatArray  # shape (n, d), effect of measured disturbances in deviations; d may be 0
+    constant: FloatArray  # g, shape (n,), the bias of an ARX equation
+    stem0: FloatArray  # stem0, pv0: the operating point χ₀ (m,) in %, y₀ (p,) in units of PV
+    pv0: FloatArray
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            values = np.array(getattr(self, field.name), dtype=float)
+            if not np.isfinite(values).all():
+                raise InputError("a value is not finite", where=field.name)
+            values.flags.writeable = False
+            object.__setattr__(self, field.name, values)
+        n = self.a.shape[0]
+        expected = {
+            "a": (n, n),
+            "b": (n, self.stem0.size),
+            "c": (self.pv0.size, n),
+            "e": (n, self.e.shape[-1] if self.e.ndim == 2 else 0),
+            "constant": (n,),
+        }
+        for key, shape in expected.items():
+            found = getattr(self, key).shape
+            if found != shape:
+                raise InputError(f"shape {found} does not fit", where=key, fix=f"make it {shape}")
+
+    @property
+    def order(self) -> int:
+        """Number n of states."""
+        return int(self.a.shape[0])
+
+    @property
+    def gain(self) -> FloatArray:
+        """Steady-state gain C (I − A)⁻¹ B, shape (p, m); inf where A integrates."""
+        try:
+            return np.asarray(self.c @ np.linalg.solve(np.eye(self.order) - self.a, self.b))
+        except np.linalg.LinAlgError:
+            return np.full((len(self.pv0), len(self.stem0)), np.inf)
+
+    def step_responses(self, samples: int) -> FloatArray:
+        """Return responses, (N, p, m), to stem steps of 1 % at sample 0, without ``constant``."""
+        return responses(self.a, self.c, itertools.repeat(self.b, samples))
 
 
 class NoiseEntry(enum.StrEnum):

@@ -6,8 +6,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.processes.linear import LinearModel
-from stiction_ros.processes.process import Noise, Process
+from stiction_ros.processes.process import LinearModel, Noise, Process
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,8 +7,8 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, ValveEstimate
-from stiction_ros.identification.answer.words import cycle, materiality, next_step, why
-from stiction_ros.identification.judgement.figures import definitions
+from stiction_ros.identification.answer.summary import cycle, materiality, next_step, why
+from stiction_ros.identification.judgement import definitions
 from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT, Curve, over_time
 from stiction_ros.pages.signals import UNITS, all_signals, close_look

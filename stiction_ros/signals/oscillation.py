@@ -52,6 +52,10 @@ NEAR = 1.4
 
 REGULAR = 1.0
 """Regularity from which on an oscillation is regular."""
+SLOW = 3.0
+"""Periods over which the slow mean is taken."""
+FAST = 8.0
+"""Parts of a period over which noise is averaged out."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -268,3 +272,14 @@ def _count_swings(
         turns = len(turnings(part, level))
         halves += turns + 1 if turns else 0
     return halves // 2
+
+
+def moving(values: FloatArray, period: float) -> FloatArray:
+    """Return ``values``, shape (N,), about their slow mean and without their fast noise."""
+    fast = slow_mean(values, period / FAST) if period >= 2 * FAST else values
+    return fast - slow_mean(values, SLOW * period)
+
+
+def size(moved: FloatArray) -> float:
+    """Return the root of the mean square."""
+    return float(np.sqrt(np.mean(moved**2)))

@@ -21,8 +21,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records.parts import DATES
-from stiction_ros.signals.movement import moving, size
-from stiction_ros.signals.oscillation import turnings
+from stiction_ros.signals.oscillation import moving, size, turnings
 from stiction_ros.survey.entry import Entry, Status
 
 NEARNESS = {"valve": 0, "tuning": 1, "unknown": 2, "none": 2, "disturbance": 3, "set_point": 4}

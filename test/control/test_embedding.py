@@ -19,9 +19,9 @@ from loops import (
 from scipy.optimize import minimize
 
 from stiction_ros.control import embedding
+from stiction_ros.control.belief import jump_form
 from stiction_ros.control.embedding import SECOND_JUMPS, EmbeddingMpc, EmbeddingTuning, patterns
 from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonWeights
-from stiction_ros.control.jump_form import FrictionSpread, jump_form
 from stiction_ros.control.result import Plan
 from stiction_ros.control.target import Target
 from stiction_ros.effects import (
@@ -31,6 +31,7 @@ from stiction_ros.effects import (
     SemiPhysicalStiction,
     XchStiction,
 )
+from stiction_ros.effects.friction.stiction import FrictionSpread
 from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control.beliefs import ValveBeliefs
+from stiction_ros.control.belief import ValveBeliefs
 from stiction_ros.control.controller import MpcController
 from stiction_ros.control.formulation import Formulation
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus

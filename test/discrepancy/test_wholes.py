@@ -5,7 +5,7 @@ from gap_loops import loop, record, with_cause
 
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
 from stiction_ros.discrepancy.answer.preview import preview
-from stiction_ros.discrepancy.answer.stem_words import look_at_stems
+from stiction_ros.discrepancy.answer.say import look_at_stems
 from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.process.change import changed_process
 from stiction_ros.discrepancy.simulation.free_run import FreeRun

@@ -28,8 +28,8 @@ from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
 from stiction_ros.effects import Behaviour, discovery
 from stiction_ros.errors import InputError
 from stiction_ros.identification.answer.identified_loop import identified_loop
-from stiction_ros.identification.answer.words import why
-from stiction_ros.identification.result.identification import (
+from stiction_ros.identification.answer.summary import why
+from stiction_ros.identification.result import (
     FitStatus,
     Identification,
     OutputModel,

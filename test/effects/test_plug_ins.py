@@ -21,8 +21,7 @@ from stiction_ros.discrepancy.data.gate import SHOWN
 from stiction_ros.effects import Behaviour, behaviours, discovery
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
-from stiction_ros.identification.friction.further import first_values
-from stiction_ros.identification.friction.grid import find_law, laws
+from stiction_ros.identification.friction import find_law, first_values, laws
 from stiction_ros.loop import LoopModel, SetPoints, simulate
 from stiction_ros.online.handover.known_friction import frictions_of
 from stiction_ros.records.record import Record

@@ -3,8 +3,7 @@
 import numpy as np
 
 from stiction_ros.effects import FloatArray
-from stiction_ros.identification.switching.patterns import Cells
-from stiction_ros.identification.switching.step_signals import StepSignals
+from stiction_ros.identification.switching import Cells, StepSignals
 
 
 def dense(steps: StepSignals, channel: int) -> FloatArray:

@@ -9,8 +9,8 @@ import simulated_loops as loops
 from stiction_ros.effects import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
-from stiction_ros.identification.friction.grid import find_law, laws, simulate
-from stiction_ros.identification.result.identification import Identification, ValveEstimate
+from stiction_ros.identification.friction import find_law, laws, simulate
+from stiction_ros.identification.result import Identification, ValveEstimate
 
 LAWS = ("kano", "choudhury", "xch")
 

@@ -13,8 +13,8 @@ from stiction_ros.effects import (
     KanoStiction,
     XchStiction,
 )
-from stiction_ros.identification.friction.grid import simulate
-from stiction_ros.identification.switching.patterns import (
+from stiction_ros.identification.friction import simulate
+from stiction_ros.identification.switching import (
     Cells,
     beginning_of,
     cells_at,

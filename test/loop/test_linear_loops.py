@@ -3,7 +3,7 @@ import pytest
 from known_loops import DELAY, A, B, Kind, known
 
 from stiction_ros.identification.closed_loop.repeated_runs import law_of
-from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.friction import find_law
 from stiction_ros.loop.linear_loops import Controllers, Process, Runs, ringing, run_loops
 from stiction_ros.loop.repeated_loops import Equations, RecoveredControl, Stems, run_again
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from made import identification, record
 
-from stiction_ros.identification.result.cause import CauseKind
-from stiction_ros.identification.result.identification import FitStatus, Identification
+from stiction_ros.identification.result import CauseKind, FitStatus, Identification
 from stiction_ros.pages.signals import CYCLES, UNCYCLED, Window
 from stiction_ros.records.record import Quality
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from stiction_ros.identification import VerdictKind
-from stiction_ros.identification.result.cause import Cause, CauseKind
-from stiction_ros.identification.result.identification import (
+from stiction_ros.identification.result import (
+    Cause,
+    CauseKind,
     FitStatus,
     Identification,
     OutputModel,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stiction_ros.identification import FitStatus, Identification, OutputModel, ValveEstimate
-from stiction_ros.identification.result.identification import VerdictKind
+from stiction_ros.identification.result import VerdictKind
 from stiction_ros.loop import LoopModel
 from stiction_ros.pages.frame import words
 from stiction_ros.records.run.log import RunLog

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.identification.result.cause import Cause, CauseKind
-from stiction_ros.identification.result.identification import (
+from stiction_ros.identification.result import (
+    Cause,
+    CauseKind,
     FitStatus,
     Identification,
     OutputModel,

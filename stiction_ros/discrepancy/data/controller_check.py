@@ -9,7 +9,7 @@ import numpy as np
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
 from stiction_ros.discrepancy.data.scans import Scans, errors_of, law_terms, scanned_twice
 from stiction_ros.discrepancy.data.set_point import NORMAL_OF_MEDIAN, told_set_points
-from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
+from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate
-from stiction_ros.discrepancy.decision.decide import FRICTION, borne_out
-from stiction_ros.discrepancy.decision.measured_stem import stem_misfit
+from stiction_ros.discrepancy.decision.decide import FRICTION, borne_out, stem_misfit
 from stiction_ros.discrepancy.decision.scores import all_candidates
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate

@@ -6,8 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate
-from stiction_ros.discrepancy.candidate.decoys import decoys
-from stiction_ros.discrepancy.candidate.output import output_candidates
+from stiction_ros.discrepancy.candidate.output import decoys, output_candidates
 from stiction_ros.discrepancy.candidate.plugged import plugged_candidates
 from stiction_ros.discrepancy.candidate.valve import valve_candidates
 from stiction_ros.discrepancy.candidate.wave import disturbance_candidates

@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from stiction_ros.discrepancy.likelihood.declared_noise import seen_noise
 from stiction_ros.discrepancy.likelihood.noise import (
     Blocks,
     NoiseFit,
@@ -16,7 +17,6 @@ from stiction_ros.discrepancy.likelihood.noise import (
     projector,
     whitened_columns,
 )
-from stiction_ros.discrepancy.likelihood.seen_noise import seen_noise
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray
 from stiction_ros.processes import AlteredProcess, ArxProcess

@@ -13,7 +13,7 @@ from stiction_ros.identification.identification_options import IdentificationOpt
 from stiction_ros.identification.linear.data import LinearKind
 from stiction_ros.identification.linear.fit import LinearOptions, fit_linear
 from stiction_ros.identification.methods import identify
-from stiction_ros.identification.result.identification import VerdictKind
+from stiction_ros.identification.result import VerdictKind
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 

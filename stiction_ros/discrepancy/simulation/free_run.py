@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.linalg import block_diag
 
+from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, Blocks
-from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.responses import Responses, responses_of
 from stiction_ros.effects import Behaviour, FloatArray, Seen
 from stiction_ros.effects.behaviour import BoolArray

@@ -1,4 +1,4 @@
-"""The first step: the data are judged, and the model is driven by the recorded OP."""
+"""The first step: the data are judged, the model is driven by the recorded OP, rows kept back."""
 
 import dataclasses
 import time
@@ -10,14 +10,16 @@ from stiction_ros.discrepancy.data.controller_check import check_controller, uns
 from stiction_ros.discrepancy.data.gate import DataFinding, open_gate
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.fit.kept_back import with_surprises_fitted
 from stiction_ros.discrepancy.gap_options import GapOptions
+from stiction_ros.discrepancy.likelihood.noise import SURPRISE
 from stiction_ros.discrepancy.process.first_model import liveliest_parts
-from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs, moves_on
+from stiction_ros.discrepancy.simulation.free_run import PHASES, FreeRun, Runs, moves_on
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.effects import TimeShift, Tuning
+from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
+
+MOST = 0.9  # of what is beyond chance, that the quarter of the rows that is kept back may hold
 
 
 def begin(
@@ -107,3 +109,29 @@ def add_data_effects(model: LoopModel, findings: Sequence[DataFinding]) -> LoopM
         document.setdefault("provenance", []).append(note | values)
         model = LoopModel.from_mapping(document, model.name)
     return model
+
+
+def with_surprises_fitted(base: Baseline) -> Runs:
+    """Return the records, other blocks kept back where those hold all of what nothing foretells.
+
+    Behind noise that forgets nothing, the step of a level is a single innovation. Kept back, it
+    tells that something happened, but neither what nor how much.
+    """
+    runs, beyond, phases = base.run.runs, _beyond_chance(base), []
+    for r, (rows, usual) in enumerate(zip(runs.slices, runs.phases, strict=True)):
+        part = beyond[rows]
+        kept = {phase: float(part[runs.kept_back(r, phase)].sum()) for phase in PHASES}
+        most = kept[usual] > MOST * float(part.sum())
+        phases.append(min(kept, key=kept.__getitem__) if most else usual)
+    if tuple(phases) == runs.phases:
+        return runs
+    return dataclasses.replace(runs, phases=tuple(phases))
+
+
+def _beyond_chance(base: Baseline) -> FloatArray:
+    """Return by how much squared innovations exceed what is never chance, shape (N,)."""
+    beyond = np.zeros(len(base.run.runs))
+    for noise, blocks in zip(base.noise, base.blocks, strict=True):
+        squared = (noise.innovations / noise.innovation_std) ** 2 - SURPRISE**2
+        beyond += np.where(blocks.scored, np.maximum(squared, 0.0), 0.0)
+    return beyond

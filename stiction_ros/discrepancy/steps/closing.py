@@ -17,8 +17,14 @@ from stiction_ros.discrepancy.answer.found_effects import (
     without_its_jump,
 )
 from stiction_ros.discrepancy.answer.results import Discrepancy
-from stiction_ros.discrepancy.answer.say import LEFT, called, experiment_for, overall, reason_for
-from stiction_ros.discrepancy.answer.stem_words import look_at_stems
+from stiction_ros.discrepancy.answer.say import (
+    LEFT,
+    called,
+    experiment_for,
+    look_at_stems,
+    overall,
+    reason_for,
+)
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.decision.decide import SURE, GapVerdict, on_the_way, verdict_of
 from stiction_ros.discrepancy.decision.extend import AddedEffect
@@ -30,10 +36,11 @@ from stiction_ros.discrepancy.fit.uncertainty import (
     likelihood_intervals,
     otherwise,
 )
-from stiction_ros.discrepancy.gap.measure import closed_share, free_run_gap
-from stiction_ros.discrepancy.gap.noise_check import (
+from stiction_ros.discrepancy.gap.measure import (
     OutputNoise,
     check_noise,
+    closed_share,
+    free_run_gap,
     noise_sentences,
     spans_steps,
 )

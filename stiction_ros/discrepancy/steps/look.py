@@ -7,7 +7,15 @@ import numpy as np
 
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.valve import departures
-from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict, decide, thinned_away
+from stiction_ros.discrepancy.decision.decide import (
+    Decision,
+    GapVerdict,
+    confirmed_by_stem,
+    decide,
+    not_contradicted,
+    thinned_away,
+    told_by_stem,
+)
 from stiction_ros.discrepancy.decision.extend import (
     AddedEffect,
     Extension,
@@ -19,11 +27,6 @@ from stiction_ros.discrepancy.decision.extend import (
     run_with,
     tangents,
     told_already,
-)
-from stiction_ros.discrepancy.decision.measured_stem import (
-    confirmed,
-    not_contradicted,
-    told_by_stem,
 )
 from stiction_ros.discrepancy.decision.scores import (
     Scores,
@@ -215,7 +218,7 @@ def _in_doubt_of_place(base: Baseline, decision: Decision) -> Decision:
     """
     if decision.chosen is None or not decision.chosen.candidate.about.bends:
         return decision
-    if confirmed(base.run, decision.chosen):
+    if confirmed_by_stem(base.run, decision.chosen):
         return decision
     _, _, valve = decision.chosen.candidate.place.partition(":")
     names = base.run.model.outputs

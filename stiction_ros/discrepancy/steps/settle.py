@@ -5,9 +5,13 @@ import itertools
 from collections.abc import Mapping, Sequence
 
 from stiction_ros.discrepancy.candidate.base import figures_of
-from stiction_ros.discrepancy.decision.decide import FRICTION, confirmed, large_enough
+from stiction_ros.discrepancy.decision.decide import (
+    FRICTION,
+    confirmed,
+    large_enough,
+    not_contradicted,
+)
 from stiction_ros.discrepancy.decision.extend import AddedEffect, refit_together, told_already
-from stiction_ros.discrepancy.decision.measured_stem import not_contradicted
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.steps.look import look_on, scored_by
 from stiction_ros.discrepancy.steps.mending import mended, singles

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from stiction_ros.discrepancy.decision.decide import on_the_way
 from stiction_ros.discrepancy.decision.extend import AddedEffect, base_with, refit_together
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.noise_check import spans_steps
+from stiction_ros.discrepancy.gap.measure import spans_steps
 from stiction_ros.discrepancy.gap.noise_effects import noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.process.change import ChangedProcess, ProcessChange, changed_process

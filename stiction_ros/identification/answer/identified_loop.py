@@ -14,12 +14,7 @@ from stiction_ros.identification.closed_loop.scaled_loop import (
     scaled,
     scaled_process,
 )
-from stiction_ros.identification.result.identification import (
-    FitStatus,
-    Identification,
-    OutputModel,
-    ValveEstimate,
-)
+from stiction_ros.identification.result import FitStatus, Identification, OutputModel, ValveEstimate
 from stiction_ros.loop import LoopModel
 from stiction_ros.records.record import Record
 from stiction_ros.signals.recovered_controller import RecoveredController

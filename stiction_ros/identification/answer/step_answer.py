@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.result.identification import OutputModel
+from stiction_ros.identification.result import OutputModel
 from stiction_ros.signals.free_run import step_response
 
 RISEN = 0.632

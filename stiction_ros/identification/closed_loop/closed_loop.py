@@ -13,11 +13,7 @@ import numpy as np
 
 from stiction_ros.identification.closed_loop.repeated_runs import MOST, Repeated, span_of
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, scaled, scaled_process
-from stiction_ros.identification.result.identification import (
-    FitStatus,
-    Identification,
-    ValveEstimate,
-)
+from stiction_ros.identification.result import FitStatus, Identification, ValveEstimate
 from stiction_ros.loop.linear_loops import Process, Ringing, ringing
 from stiction_ros.records.record import Record
 from stiction_ros.signals.controller_recovery import recover

@@ -3,8 +3,7 @@
 import dataclasses
 
 from stiction_ros.identification.closed_loop.closed_loop import ClosedLoop, OutputLoop, ValveLoop
-from stiction_ros.identification.result.cause import Cause, CauseKind
-from stiction_ros.identification.result.identification import Identification, ValveEstimate
+from stiction_ros.identification.result import Cause, CauseKind, Identification, ValveEstimate
 from stiction_ros.loop.linear_loops import Ringing
 from stiction_ros.records.record import Record
 from stiction_ros.signals.oscillation import REGULAR

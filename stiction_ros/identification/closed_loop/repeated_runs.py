@@ -9,11 +9,10 @@ from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run, set_points_of
-from stiction_ros.identification.friction.grid import find_law
-from stiction_ros.identification.result.identification import ValveEstimate
+from stiction_ros.identification.friction import find_law
+from stiction_ros.identification.result import ValveEstimate
 from stiction_ros.loop.linear_loops import Controllers, Pairs, Process, Runs, run_loops
-from stiction_ros.signals.movement import moving, size
-from stiction_ros.signals.oscillation import REGULAR, oscillation
+from stiction_ros.signals.oscillation import REGULAR, moving, oscillation, size
 from stiction_ros.signals.spectral_lines import fitted_lines
 
 MOST = 6000

@@ -9,7 +9,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.result.identification import OutputModel
+from stiction_ros.identification.result import OutputModel
 from stiction_ros.loop.linear_loops import Pairs, Process
 from stiction_ros.records.record import Record
 from stiction_ros.signals.free_run import driven

@@ -7,9 +7,10 @@ import numpy as np
 from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import Judge
-from stiction_ros.identification.evidence.fit_problem import LIMIT, Problem
+from stiction_ros.identification.evidence.fit_problem import LIMIT, NOISE_ORDER, Problem
 from stiction_ros.identification.evidence.search import Found
-from stiction_ros.identification.friction.grid import coarse_grid, finer_grid
+from stiction_ros.identification.friction import coarse_grid, finer_grid
+from stiction_ros.signals.autoregression import innovations, noise_of
 
 Interval = tuple[float, float]
 
@@ -21,6 +22,8 @@ HARMLESS = 0.08  # of the range of OP: a valve is healthy when all larger bands 
 STEPS = (0.3, 0.1, 0.03, 0.01, 0.003)  # of f_S + f_D: grids round the best
 OUTWARDS = 0.01 * np.arange(1.0, 13.0)
 """Shares of f_S + f_D past the ends of what is accepted: as far as to the next node of a grid."""
+BETWEEN = 2.0  # standard deviations of OP's innovations by which an end may lie farther out
+LATE = 1.0  # samples by which a stem answers late, at most
 
 
 @dataclasses.dataclass(frozen=True)
@@ -132,3 +135,41 @@ def _profile(static: FloatArray, lost: FloatArray) -> tuple[tuple[float, float],
         for f, loss in zip(static[edges], least, strict=True)
         if np.isfinite(loss)
     )
+
+
+@dataclasses.dataclass(frozen=True)
+class Unseen:
+    """By how much one end may lie elsewhere than the samples show; unit of OP, 0 or more.
+
+    The stem feels what OP does between samples, too, and slips at peaks there. And it may answer up
+    to a sample later than OP moves: what OP has moved on by then is no friction. The band f_S + f_D
+    is what OP passes from one slip to the next in the other direction, the jump f_S − f_D to the
+    next in the same direction. A jump is not smaller for answering late: of a slip that samples
+    give no reason for, a smaller jump makes the best already.
+    """
+
+    less: float  # what OP moves before the stem answers
+    more: float  # by how much OP goes farther between samples
+
+    @classmethod
+    def of(cls, op: FloatArray) -> "Unseen":
+        """Return what samples of OP leave open, shape (N,), N at least 20."""
+        return cls(LATE * float(np.abs(np.diff(op)).mean()), BETWEEN * innovation(op))
+
+    def band(self, held: Interval) -> Interval:
+        """Return the f_S + f_D that are possible where the samples accept ``held``."""
+        return max(held[0] - 2.0 * self.less, 0.0), held[1] + 2.0 * self.more
+
+    def static(self, held: Interval) -> Interval:
+        """Return the f_S, half of band and jump, that are possible."""
+        return max(held[0] - self.less, 0.0), held[1] + 2.0 * self.more
+
+    def dynamic(self, held: Interval) -> Interval:
+        """Return the f_D, half of what the band has more than the jump, that are possible."""
+        return max(held[0] - self.less - self.more, 0.0), held[1] + self.more
+
+
+def innovation(op: FloatArray) -> float:
+    """Return the standard deviation of what the past of OP does not tell."""
+    op = op - op.mean()
+    return float(innovations(noise_of(op, NOISE_ORDER), op)[NOISE_ORDER:].std())

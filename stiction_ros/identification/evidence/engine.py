@@ -10,12 +10,16 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.closed_loop import close_loop
 from stiction_ros.identification.closed_loop.explanation import explained
+from stiction_ros.identification.conclusion import conclude, half_gains, is_deadband
 from stiction_ros.identification.engine import order_row
-from stiction_ros.identification.evidence.fit_problem import Problem
+from stiction_ros.identification.evidence.accepted import Unseen
 from stiction_ros.identification.evidence.further import with_further
 from stiction_ros.identification.evidence.laws import with_own_laws
-from stiction_ros.identification.evidence.measured_figures import figures_of
-from stiction_ros.identification.evidence.output_fit import OutputFit
+from stiction_ros.identification.evidence.measured_figures import (
+    figures_of,
+    loss_without_response,
+    responds,
+)
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
     PRICE,
@@ -25,15 +29,10 @@ from stiction_ros.identification.evidence.rates import (
     liveliest,
     looks,
 )
-from stiction_ros.identification.evidence.response import loss_without_response, responds
 from stiction_ros.identification.evidence.sensor_hold import hold_notes
-from stiction_ros.identification.evidence.unseen import Unseen
-from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.friction import find_law
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.inference.conclusion import Findings, conclude
-from stiction_ros.identification.inference.verdict import half_gains, is_deadband
-from stiction_ros.identification.judgement.figures import Figures
-from stiction_ros.identification.judgement.probability import friction_probability, verdict_of
+from stiction_ros.identification.judgement import Figures, friction_probability, verdict_of
 from stiction_ros.identification.problem.models import (
     Data,
     Model,
@@ -43,14 +42,15 @@ from stiction_ros.identification.problem.models import (
     stem_of,
 )
 from stiction_ros.identification.problem.preparation import prepare, windows
-from stiction_ros.identification.result.identification import (
+from stiction_ros.identification.result import (
     Identification,
     OrderRow,
+    Stability,
     ValveEstimate,
     VerdictKind,
+    halves,
 )
-from stiction_ros.identification.result.stability import Look as View
-from stiction_ros.identification.result.stability import Stability, halves
+from stiction_ros.identification.result import Look as View
 from stiction_ros.records.record import Record
 from stiction_ros.signals.autoregression import innovations
 
@@ -58,13 +58,13 @@ Progress = Callable[[float], None]
 
 
 def identify_by_evidence(
-    record: Record, options: IdentificationOptions | None = None, progress: Progress | None = None
+    record: Record, options: IdentificationOptions, progress: Progress | None = None
 ) -> Identification:
     """Identify friction by its evidence, and linear dynamics for the stems that it gives.
 
     Args:
         record: what was measured.
-        options: None for the defaults; of ``delay`` the lower end alone plays a part in the
+        options: of ``delay`` the lower end alone plays a part in the
             search for friction, which needs no order either.
         progress: called with the share done, 0 to 1.
 
@@ -72,7 +72,6 @@ def identify_by_evidence(
         InputError: a record that no model can be fitted to, or an unknown law.
     """
     begun = time.perf_counter()
-    options = options or IdentificationOptions()
     report = progress or (lambda share: None)
     data = prepare(record, options)
     report(0.02)
@@ -133,8 +132,8 @@ def _identification(
     model, table = _process(small, options, valves, part)
     if part is not record:
         valves, model = _over_all(record, data, valves, model)
-    findings = Findings(model, valves, table, ())
-    return dataclasses.replace(conclude(record, data, findings, 0.0), method="evidence")
+    found = conclude(record, data, model, valves, table)
+    return dataclasses.replace(found, method="evidence")
 
 
 def _estimate(
@@ -210,21 +209,13 @@ def _stability(
         name = f"rows of {look.problem.rate * sample_time:g} s"
         shown = held.times(float(look.problem.span[valve]))
         views.append(View(name, held.gain, agrees, shown.band))
-    gains = _half_gains(agreed.look, valve)
-    return Stability((*views, *halves(gains, PRICE if healthy else None)))
-
-
-def _half_gains(look: Look, valve: int) -> tuple[float, float]:
-    """Return what the friction of a valve gains in either half of the rows of a rate."""
-    best, without = look.found.best, look.found.without[valve]
-    return half_gains(
-        (_innovations(look.problem, one), _innovations(look.problem, other))
+    best, without = agreed.look.found.best, agreed.look.found.without[valve]
+    first = agreed.look.problem.first
+    gains = half_gains(
+        (innovations(one.noise, one.rest)[first:], innovations(other.noise, other.rest)[first:])
         for one, other in zip(best.fits, without.fits, strict=True)
     )
-
-
-def _innovations(problem: Problem, fit: OutputFit) -> FloatArray:
-    return innovations(fit.noise, fit.rest)[problem.first :]
+    return Stability((*views, *halves(gains, PRICE if healthy else None)))
 
 
 def _over_all(

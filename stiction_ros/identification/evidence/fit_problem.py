@@ -10,8 +10,7 @@ from stiction_ros.effects import FrictionLaw
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.closed_loop.tuning import Tuning
 from stiction_ros.identification.evidence.fit_kernels import Lines
-from stiction_ros.identification.friction.further import first_values
-from stiction_ros.identification.friction.grid import find_law, simulate
+from stiction_ros.identification.friction import find_law, first_values, simulate
 from stiction_ros.identification.identification_options import IdentificationOptions, limited
 from stiction_ros.identification.kernels.lags import in_rows
 from stiction_ros.identification.linear.response_prior import Reach

@@ -11,13 +11,8 @@ from stiction_ros.identification.evidence.candidate import Candidate, Judge, ide
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.output_fit import white
 from stiction_ros.identification.evidence.search import DRIFT, Found, search
-from stiction_ros.identification.friction.further import (
-    FurtherSearch,
-    Settled,
-    first_values,
-    searched,
-)
-from stiction_ros.identification.result.identification import ValveEstimate
+from stiction_ros.identification.friction import FurtherSearch, Settled, first_values, searched
+from stiction_ros.identification.result import ValveEstimate
 
 EQUAL = 10.0
 """Loss by which other values than those they begin at must be better before the search."""

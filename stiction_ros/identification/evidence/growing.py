@@ -14,7 +14,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import Candidate, Judge, rows_apart
 from stiction_ros.identification.evidence.fit_problem import LIMIT, Problem
 from stiction_ros.identification.evidence.output_fit import OutputFit
-from stiction_ros.identification.friction.grid import TURN, even_grid, samples_of_turns
+from stiction_ros.identification.friction import TURN, even_grid, samples_of_turns
 
 TURNS = 6  # of OP in the first beginning
 LEAST = 100  # rows of it

@@ -19,7 +19,7 @@ from stiction_ros.identification.evidence.accepted import MISFIT, accepted
 from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.rates import Look, agreement
 from stiction_ros.identification.evidence.search import Found, search_again, search_law
-from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.friction import find_law
 from stiction_ros.identification.identification_options import AUTO, IdentificationOptions
 
 Law = type[FrictionLaw]

@@ -30,9 +30,9 @@ from stiction_ros.identification.evidence.further import settled
 from stiction_ros.identification.evidence.outside_waves import outside_wave
 from stiction_ros.identification.evidence.search import Found, better, search, search_again
 from stiction_ros.identification.evidence.sensor_hold import refresh, restored
-from stiction_ros.identification.exact.long_records import PART, liveliest_begin
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.linear.response_prior import FREE
+from stiction_ros.identification.problem.preparation import PART, liveliest_begin
 from stiction_ros.records.record import Record
 
 RATES = (1, 2, 4, 8)

@@ -27,7 +27,7 @@ from stiction_ros.identification.evidence.output_fit import (
     follow,
     white,
 )
-from stiction_ros.identification.friction.grid import coarse_grid, cross_grid, finer_grid
+from stiction_ros.identification.friction import coarse_grid, cross_grid, finer_grid
 
 SEEDS = 6  # frictions taken from one look at the whole triangle
 APART = 0.03  # of the span of OP, by which they differ

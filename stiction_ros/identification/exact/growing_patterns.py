@@ -4,7 +4,7 @@ The right pattern of a record may be less than a thousandth of the span wide, an
 neighbours, which slip once at another sample, much worse than wrong ones far away: no grid leads
 there. In the first few slips the same pattern is a wide cell of the (J, S) plane. So cells are
 searched on a beginning of the record; the best ones, and no others, are divided into the cells
-of a longer beginning (:mod:`stiction_ros.identification.switching.patterns`), and so on up to the
+of a longer beginning (:mod:`stiction_ros.identification.switching`), and so on up to the
 whole record.
 
 The stem before its first slip is left free, so only the sample of that slip has to be tried.
@@ -18,11 +18,10 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.exact.pattern_search import PatternSearch, points_of
-from stiction_ros.identification.friction.grid import TURN, even_grid, samples_of_turns
+from stiction_ros.identification.friction import TURN, even_grid, samples_of_turns
 from stiction_ros.identification.problem.models import Criterion, Data, Model, with_valve
 from stiction_ros.identification.problem.output_error import Orders
-from stiction_ros.identification.switching.patterns import Beginning, cells_at
-from stiction_ros.identification.switching.scan import PatternScan
+from stiction_ros.identification.switching import Beginning, PatternScan, cells_at
 
 LONGEST = 1500  # samples of a record that is searched so
 GROWTH = 1.2  # of a window to the next

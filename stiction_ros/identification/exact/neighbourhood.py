@@ -10,12 +10,22 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.exact.pattern_search import PatternSearch, nearby_delays, points_of
+from stiction_ros.identification.exact.pattern_search import (
+    PatternSearch,
+    nearby_delays,
+    overlapping,
+    points_of,
+    remainders,
+)
 from stiction_ros.identification.problem.models import Data, Model, with_valve
 from stiction_ros.identification.problem.output_error import Orders
-from stiction_ros.identification.switching.patterns import Beginning, Cells, beginning_of, cells_at
-from stiction_ros.identification.switching.rectangles import overlapping, remainders
-from stiction_ros.identification.switching.scan import PatternScan
+from stiction_ros.identification.switching import (
+    Beginning,
+    Cells,
+    PatternScan,
+    beginning_of,
+    cells_at,
+)
 
 MOST_CELLS = 3000
 CELL_SAMPLES = 3e7

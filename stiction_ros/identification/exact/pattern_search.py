@@ -1,6 +1,6 @@
 """Evaluates switching patterns of one valve, each at its best f_D.
 
-Patterns are listed exactly (:mod:`stiction_ros.identification.switching.patterns`) in rectangles of
+Patterns are listed exactly (:mod:`stiction_ros.identification.switching`) in rectangles of
 the (J, S) plane. Which rectangle is worth it is for :mod:`.neighbourhood` and
 :mod:`.growing_patterns` to say; the remaining frictions are searched on grids (:mod:`.search`).
 """
@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.kernels.level import best_levels
@@ -25,18 +26,17 @@ from stiction_ros.identification.problem.models import (
 )
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.side_by_side import together
-from stiction_ros.identification.switching.patterns import (
+from stiction_ros.identification.switching import (
     Beginning,
     Cells,
+    PatternScan,
+    StepSignals,
     cells_at,
     first_slip_range,
     levels_of,
     levels_with,
     resting_cells,
 )
-from stiction_ros.identification.switching.rectangles import area, points_inside, remainders
-from stiction_ros.identification.switching.scan import PatternScan
-from stiction_ros.identification.switching.step_signals import StepSignals
 
 FEW = 60  # cells too few to tell how many there will be
 MOST_LEVELS = 30
@@ -253,3 +253,41 @@ def best_in_cells(
     scan = search.evaluate(resting_cells(search.u, levels, points_of(friction), search.law))
     rows = [scan.middle(index, search.limit) for index in range(len(friction))]
     return np.array(rows), scan
+
+
+def area(rectangles: FloatArray) -> float:
+    """Return the area of all rectangles."""
+    jl, jh, sl, sh = rectangles.T
+    return float((jh - jl) @ (sh - sl))
+
+
+def points_inside(rectangles: FloatArray) -> FloatArray:
+    """Return one point (J, S) with S ≥ J inside every rectangle, the middle where possible."""
+    jl, jh, sl, sh = rectangles.T
+    jump, reverse = 0.5 * (jl + jh), 0.5 * (sl + sh)
+    outside = reverse < jump
+    jump = np.where(outside, jl + 0.1 * (np.minimum(jh, sh) - jl), jump)
+    reverse = np.where(outside, sh - 0.1 * (sh - np.maximum(sl, jl)), reverse)
+    return np.column_stack([jump, reverse])
+
+
+def remainders(rectangles: FloatArray, cells: FloatArray) -> FloatArray:
+    """Return up to four rectangles per row: what its cell does not cover."""
+    jl, jh, sl, sh = rectangles.T
+    cl, ch = np.maximum(cells[:, 0], jl), np.minimum(cells[:, 1], jh)
+    dl, dh = np.maximum(cells[:, 2], sl), np.minimum(cells[:, 3], sh)
+    return np.concatenate(
+        [
+            np.column_stack([jl, cl, sl, sh]),
+            np.column_stack([ch, jh, sl, sh]),
+            np.column_stack([cl, ch, sl, dl]),
+            np.column_stack([cl, ch, dh, sh]),
+        ]
+    )
+
+
+def overlapping(rectangles: FloatArray, other: FloatArray) -> NDArray[np.bool_]:
+    """Return which rectangles share more than an edge with another one, shape (R,)."""
+    jl, jh, sl, sh = rectangles.T
+    meets = (jl < other[1]) & (jh > other[0]) & (sl < other[3]) & (sh > other[2])
+    return np.asarray(meets)

@@ -24,7 +24,7 @@ from stiction_ros.identification.exact.pattern_search import (
     nearby_delays,
     points_of,
 )
-from stiction_ros.identification.friction.grid import coarse_grid, cross_grid, even_grid, finer_grid
+from stiction_ros.identification.friction import coarse_grid, cross_grid, even_grid, finer_grid
 from stiction_ros.identification.problem.models import (
     Criterion,
     Data,

@@ -1,6 +1,6 @@
 """Lagged products of many stems and switching patterns with themselves and with fixed signals.
 
-Signals come as rows of moves, see :mod:`stiction_ros.identification.switching.step_signals`.
+Signals come as rows of moves, see :mod:`stiction_ros.identification.switching`.
 Products with fixed signals are sums over moves: a fixed signal, filtered backwards in time and
 summed up from its end, says at every sample what a step there contributes. Products of the signals
 with themselves are sums over moves as well where there is no prefilter, otherwise over samples.

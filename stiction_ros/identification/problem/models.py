@@ -11,12 +11,12 @@ from functools import partial
 import numpy as np
 
 from stiction_ros.effects import FloatArray, FrictionLaw
-from stiction_ros.identification.friction.grid import simulate
+from stiction_ros.identification.friction import simulate
 from stiction_ros.identification.kernels.scan import best_apart
 from stiction_ros.identification.problem.output_error import Orders, OutputFit, fit_output
 from stiction_ros.identification.problem.scan import BATCH, OutputScan
 from stiction_ros.identification.side_by_side import together
-from stiction_ros.identification.switching.step_signals import StepSignals, stem_steps
+from stiction_ros.identification.switching import StepSignals, stem_steps
 
 DELAY_MARGIN = 10.8
 EQUAL = 3.84

@@ -1,9 +1,9 @@
-"""From a record to centred, scaled data and the orders that are tried."""
+"""From a record to centred, scaled data, its liveliest part and the orders that are tried."""
 
 import numpy as np
 
-from stiction_ros.identification.friction.further import first_values
-from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.friction import find_law, first_values
 from stiction_ros.identification.identification_options import IdentificationOptions, limited
 from stiction_ros.identification.problem.input_checks import (
     TOO_SHORT,
@@ -15,6 +15,9 @@ from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.records.record import Record
 
 MIN_SAMPLES = 60
+PART = 6000
+"""Samples of a long record that are searched; all of it is concluded from. A friction that suits
+them is within a few thousandths of the best for the whole, round which alone all are looked at."""
 DEFAULT_ORDERS = (1, 2, 3)
 
 
@@ -62,3 +65,20 @@ def window(options: IdentificationOptions, output_order: int, input_order: int) 
     largest_input = input_order_for(options, max(tried_orders(options))) + 2
     first = options.delay[1] + 2 * largest_input + largest + options.noise_order + 1
     return Orders(output_order, input_order, options.noise_order, first)
+
+
+def liveliest_part(data: Data) -> Data:
+    """Return the ``PART`` samples in which OP moves most; all of a shorter record."""
+    samples = data.u.shape[1]
+    if samples <= PART:
+        return data
+    begin = liveliest_begin(data.u / data.u.std(axis=1, keepdims=True))
+    return data.part(begin, begin + PART)
+
+
+def liveliest_begin(op: FloatArray) -> int:
+    """Return where the ``PART`` samples begin in which OP, scaled, shape (m, N), moves most."""
+    samples = op.shape[1]
+    begins = np.linspace(0, samples - PART, 2 * (samples // PART) + 1).astype(int)
+    moved = [float(op[:, at : at + PART].std(axis=1).sum()) for at in begins]
+    return int(begins[int(np.argmax(moved))])

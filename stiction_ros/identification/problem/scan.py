@@ -15,7 +15,7 @@ from stiction_ros.identification.kernels.delay import delay_energy
 from stiction_ros.identification.kernels.filter import Window
 from stiction_ros.identification.kernels.scan import least_energy, remaining_tails, step_products
 from stiction_ros.identification.problem.output_error import Orders
-from stiction_ros.identification.switching.step_signals import StepSignals
+from stiction_ros.identification.switching import StepSignals
 
 BATCH = 500  # signals that are worked on together
 EXPLAINED = 1e-7  # of a column, below which the others explain it

@@ -8,7 +8,7 @@ import numpy as np
 from stiction_ros.errors import InputError
 from stiction_ros.identification.answer.step_answer import StepAnswer
 from stiction_ros.identification.evidence.sensor_hold import held_rows
-from stiction_ros.identification.result.identification import Identification
+from stiction_ros.identification.result import Identification
 from stiction_ros.identification.valve_test.frictions import SMALLEST
 from stiction_ros.identification.valve_test.judgement import Judgement, judged, measured_enough
 from stiction_ros.identification.valve_test.plan import CLEAR, WIDENS, Facts

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.identification.evidence.sensor_hold import held_rows
-from stiction_ros.identification.result.identification import VerdictKind
+from stiction_ros.identification.result import VerdictKind
 from stiction_ros.identification.valve_test.frictions import SMALLEST, Frictions
 from stiction_ros.identification.valve_test.likelihood import OWN_ERROR, log_sum
 from stiction_ros.identification.valve_test.search import Explanation, Trial

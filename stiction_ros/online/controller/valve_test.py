@@ -49,6 +49,7 @@ class ValveTest:
         self.judgement: Judgement | None = None
         self._level, *self._levels = (facts.op, *first_round(facts).levels[:-1])
         self._made, self._left = 0, hold
+        self._met = ""  # limit of PV that was met: OP is back, and what PV showed is judged
         self._late = max(math.ceil(facts.dead / facts.hold * hold), 1) + 1
         self._op: list[float] = []
         self._pv: list[float] = []
@@ -72,11 +73,15 @@ class ValveTest:
         low, high = self.facts.pv_limit
         if not np.isfinite(pv):
             self.stop("PV is bad")
-        elif not low <= pv <= high or not low <= self._coming(pv) <= high:
-            self.stop(f"PV {pv:.4g} goes beyond {low:.4g} to {high:.4g}")
-        if not self.over and self._left <= 0:
+        elif not self._met and not (low <= pv <= high and low <= self._coming(pv) <= high):
+            self._met = f"PV {pv:.4g} goes beyond {low:.4g} to {high:.4g}"
+            self._pv.append(pv)
+            self._op.append(self._level)
+        if not self.over and self._met and self._judged():
+            self.stop(f"{self._met}. {self._told}".strip())
+        elif not self.over and not self._met and self._left <= 0:
             self._go_on()
-        if self.over:
+        if self.over or self._met:
             return self.facts.op
         self._op.append(self._level)
         self._pv.append(pv)
@@ -98,17 +103,29 @@ class ValveTest:
         one, other = np.mean(self._pv[-2 * half : -half]), np.mean(self._pv[-half:])
         return abs(float(other - one)) <= CLEAR * self.facts.noise
 
+    def _judged(self) -> bool:
+        """Judge what was answered, where that is enough; return whether nothing is waited for."""
+        if self._work is None:
+            if self._made < 2 or not measured_enough(np.array(self._pv), self._made):
+                return True
+            signals = np.array(self._op), np.array(self._pv)
+            self._work = self._background.submit(judged, *signals, self.facts.gain)
+        if not self._work.done():
+            return False
+        self.judgement, self._work = self._work.result(), None
+        return True
+
+    @property
+    def _told(self) -> str:
+        return "" if self.judgement is None else self.judgement.sentence
+
     def _go_on(self) -> None:
-        """Judge what was answered, and move on where the judgement is there and leaves it open."""
-        if self._made > 1 and measured_enough(np.array(self._pv), self._made):
-            if self._work is None:
-                signals = np.array(self._op), np.array(self._pv)
-                self._work = self._background.submit(judged, *signals, self.facts.gain)
-            if not self._work.done():
-                return
-            self.judgement, self._work = self._work.result(), None
+        """Move on where what was answered is judged and leaves it open."""
+        if not self._judged():
+            return
+        if self.judgement is not None:
             if self.judgement.sure and self.judgement.known_to <= self._margin:
-                self.stop(self.judgement.sentence)
+                self.stop(self._told)
                 return
             if self._made % 2 == 0 and not (
                 self._levels and stays(self.facts, self.judgement, self._levels[:2])
@@ -118,10 +135,7 @@ class ValveTest:
                     plan = further_round(self.facts, self.judgement, 1)
                 self._levels = [] if plan is None else list(plan.levels[:-1])
         if not self._levels:
-            told = self.judgement
-            self.stop(
-                "PV shows hardly any value that is measured" if told is None else told.sentence
-            )
+            self.stop(self._told or "PV shows hardly any value that is measured")
             return
         if not self._made:
             if len(self._op) < RESTS * self.hold and not self._rests():

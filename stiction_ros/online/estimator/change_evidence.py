@@ -11,7 +11,7 @@ from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise
 from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, OutputModel
-from stiction_ros.identification.friction.grid import find_law, simulate
+from stiction_ros.identification.friction import find_law, simulate
 from stiction_ros.records import Record
 
 FORGETTING = 0.97  # of the high-pass that takes slow disturbances out

@@ -11,7 +11,7 @@ from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification, IdentificationOptions, OutputModel, identify
-from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.friction import find_law
 from stiction_ros.identification.identification_options import AUTO
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.member_loops import is_set_point

@@ -6,7 +6,7 @@ from typing import Self
 
 from stiction_ros.effects import Stiction
 from stiction_ros.identification import ValveEstimate, VerdictKind
-from stiction_ros.identification.friction.grid import behaviour_of
+from stiction_ros.identification.friction import behaviour_of
 from stiction_ros.settings import setting
 
 Interval = tuple[float, float]

@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction_ros import identification
 from stiction_ros.errors import InputError
-from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.friction import find_law
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.monitor.gap_finding import GapFinding

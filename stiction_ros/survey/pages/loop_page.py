@@ -5,7 +5,7 @@ from typing import Any
 
 from stiction_ros.gain.advice import advice
 from stiction_ros.identification import Identification
-from stiction_ros.identification.answer.words import materiality, next_step, why
+from stiction_ros.identification.answer.summary import materiality, next_step, why
 from stiction_ros.pages.frame import card, framed, text, words
 from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.pages.signals import Units, all_signals, close_look

@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.judgement.figures import Figures, definitions
-from stiction_ros.identification.judgement.probability import (
+from stiction_ros.identification.judgement import (
+    Figures,
     Model,
     Node,
+    VerdictKind,
+    definitions,
     friction_probability,
     verdict_of,
 )
-from stiction_ros.identification.judgement.verdict_kind import VerdictKind
 
 TREES, LEAVES, RATE = 150, 12, 0.08
 """Of the boosting. In eight-fold trials on seeds 0:399 of four worlds 100 trees predict as well and
@@ -96,9 +97,8 @@ def by_folds(rows: Sequence[Judged], without: str | None = None) -> FloatArray:
     for k in range(FOLDS):
         rest = [row for row, its in zip(rows, fold, strict=True) if its != k]
         model = fitted(rest, without)
-        told[fold == k] = probabilities(
-            model, [rows[i] for i in np.flatnonzero(fold == k).tolist()]
-        )
+        left_out = [row for row, its in zip(rows, fold, strict=True) if its == k]
+        told[fold == k] = probabilities(model, left_out)
     return told
 
 

@@ -107,7 +107,7 @@ def run(options: argparse.Namespace) -> int:
 
 def show(rows: "list[Judged]", ablate: bool) -> None:
     """Print how loops are told by trees fitted to others: of all worlds, and of other worlds."""
-    from stiction_ros.identification.judgement.figures import definitions
+    from stiction_ros.identification.judgement import definitions
     from stiction_studies.calibration.fitting import (
         by_folds,
         counts,
@@ -144,7 +144,7 @@ def show(rows: "list[Judged]", ablate: bool) -> None:
 
 
 def _row_of(values: Any) -> "Judged":
-    from stiction_ros.identification.judgement.figures import Figures
+    from stiction_ros.identification.judgement import Figures
     from stiction_studies.calibration.fitting import Judged
 
     return Judged(**{**values, "figures": Figures(**values["figures"])})

@@ -5,7 +5,7 @@ import dataclasses
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.identification.friction.grid import laws
+from stiction_ros.identification.friction import laws
 from stiction_ros.loop import LoopModel, SetPoints
 from stiction_ros.online.session import Scenario, run_live
 from stiction_ros.processes import NoiseEntry

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from stiction_ros.cli.main import main
-from stiction_ros.identification.judgement.figures import definitions
+from stiction_ros.identification.judgement import definitions
 from stiction_studies.calibration.loops import WORLDS
 from stiction_studies.calibration.plain_loops import plain_loop
 from stiction_studies.commands import calibrate

@@ -21,12 +21,7 @@ from stiction_ros import (
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
 from stiction_ros.identification.answer.identified_loop import _noise, identified_loop
-from stiction_ros.identification.result.identification import (
-    FitStatus,
-    OutputModel,
-    ValveEstimate,
-    VerdictKind,
-)
+from stiction_ros.identification.result import FitStatus, OutputModel, ValveEstimate, VerdictKind
 from stiction_ros.records.csv_writer import write_csv
 
 

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects import FloatArray
-from stiction_ros.identification.friction.grid import find_law
-from stiction_ros.identification.result.identification import (
+from stiction_ros.identification.friction import find_law
+from stiction_ros.identification.result import (
     FitStatus,
     Identification,
     OutputModel,

@@ -9,8 +9,7 @@ from known_loops import Kind, Known, changed, known
 from stiction_ros.identification.closed_loop.closed_loop import ClosedLoop, OutputLoop, close_loop
 from stiction_ros.identification.closed_loop.explanation import cause as cause_of
 from stiction_ros.identification.closed_loop.explanation import explained
-from stiction_ros.identification.result.cause import Cause, CauseKind
-from stiction_ros.identification.result.identification import Identification, VerdictKind
+from stiction_ros.identification.result import Cause, CauseKind, Identification, VerdictKind
 from stiction_ros.signals.outside_line import NO_LINE
 
 

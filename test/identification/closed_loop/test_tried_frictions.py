@@ -8,7 +8,7 @@ import pytest
 from stiction_ros.identification import VerdictKind
 from stiction_ros.identification.closed_loop.repeated_runs import tried_frictions
 from stiction_ros.identification.evidence.further import widened
-from stiction_ros.identification.result.identification import ValveEstimate
+from stiction_ros.identification.result import ValveEstimate
 
 VALVE = ValveEstimate(
     "V1", VerdictKind.STICKY, "he", 3.0, (2.0, 4.5), 1.0, (0.2, 2.0), 2.0, 0.0, 40, {}

@@ -6,10 +6,9 @@ from evidence_loops import he, pi_loop
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stiction_ros.identification.evidence.accepted import accepted
+from stiction_ros.identification.evidence.accepted import Unseen, accepted
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.search import Found, search
-from stiction_ros.identification.evidence.unseen import Unseen
 from stiction_ros.identification.kernels.scan import best_apart
 from stiction_ros.records.record import Record
 

@@ -11,7 +11,7 @@ from stiction_ros.identification import Identification, IdentificationOptions, i
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.laws import with_own_laws
 from stiction_ros.identification.evidence.rates import looks
-from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.friction import find_law
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.records.record import Record
 

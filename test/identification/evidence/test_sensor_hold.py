@@ -27,6 +27,15 @@ def test_rounding_alone_holds_nothing(seed: int, step: float) -> None:
     assert not held_rows(step * np.round(walk)).any()
 
 
+@given(st.integers(0, 2**32 - 1), st.floats(0.6, 2.0), st.integers(40, 80))
+def test_a_rounded_value_that_noise_would_have_changed_was_not_read(
+    seed: int, noise: float, length: int
+) -> None:
+    values = np.round(np.random.default_rng(seed).normal(0.0, noise, 200))
+    values[60 : 60 + length] = values[60]
+    assert held_rows(values)[61 : 60 + length].all()
+
+
 @given(st.integers(0, 2**32 - 1), st.floats(0.5, 1.0))
 def test_a_sensor_that_reports_by_exception_holds_until_it_reports(seed: int, width: float) -> None:
     walk = np.cumsum(np.random.default_rng(seed).uniform(-0.4, 0.4, 300))

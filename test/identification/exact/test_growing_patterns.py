@@ -22,13 +22,12 @@ from stiction_ros.identification.exact.growing_patterns import (
     thinned,
     window_lengths,
 )
-from stiction_ros.identification.exact.pattern_search import PatternSearch
+from stiction_ros.identification.exact.pattern_search import PatternSearch, area
 from stiction_ros.identification.exact.search import search
 from stiction_ros.identification.problem.models import Criterion, Data, Model, linear_model
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import prepare, window
-from stiction_ros.identification.switching.patterns import Beginning, beginning_of, cells_at
-from stiction_ros.identification.switching.rectangles import area
+from stiction_ros.identification.switching import Beginning, beginning_of, cells_at
 from stiction_studies.examples import example2
 
 

@@ -22,8 +22,7 @@ from stiction_ros.identification.problem.models import (
 )
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import prepare, window
-from stiction_ros.identification.switching.patterns import beginning_of, cells_at, levels_with
-from stiction_ros.identification.switching.step_signals import StepSignals
+from stiction_ros.identification.switching import StepSignals, beginning_of, cells_at, levels_with
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from stiction_ros.identification.problem.models import Model, linear_model, refi
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import prepare, window
 from stiction_ros.identification.problem.scan import OutputScan
-from stiction_ros.identification.switching.step_signals import StepSignals
+from stiction_ros.identification.switching import StepSignals
 
 
 @given(seed=st.integers(0, 1000), na=st.integers(1, 3), nb=st.integers(1, 3))

@@ -77,6 +77,20 @@ def test_pv_at_its_limit_ends_it(tested: Run) -> None:
     assert tested.op[-1] == tested.op[30]
 
 
+def test_what_pv_showed_up_to_its_limit_is_judged() -> None:
+    run = Run()
+    run.go(31)
+    test = run.live.test
+    assert test is not None
+    run.go(5 * test.hold)
+    moves, last = test.moves, test.judgement
+    assert moves > 2
+    run.go(1, pv=80.0)
+    assert test.over.startswith("PV 80 goes beyond")
+    assert test.judgement is not last
+    assert run.op[-1] == test.facts.op
+
+
 def test_a_late_sample_ends_it(tested: Run) -> None:
     tested.live.pass_over(np.array([np.nan]))
     assert tested.told == "valve test: a sample was late or bad"

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.control.jump_form import jump_form
+from stiction_ros.control.belief import jump_form
 from stiction_ros.effects import (
     ChoudhuryStiction,
     FrictionPair,

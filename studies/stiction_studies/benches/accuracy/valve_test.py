@@ -36,7 +36,8 @@ class Ended:
 
     Attributes:
         seed, kind, plant, law, f_s, circumstances: of the valve.
-        verdict, probability, interval: of the last judgement.
+        verdict, probability, interval: of the last judgement; undecided where PV met its limit
+            before the second move.
         moves: that were made.
         duration: in times of dead time and lag together.
         beyond: of PV's limit, in standard deviations of the noise.
@@ -123,8 +124,6 @@ def judge(seed: int) -> Ended:
     clean = case.pv(np.append(op, np.full(late, op[-1])))[1]
     away = np.maximum(clean - facts.pv_limit[1], facts.pv_limit[0] - clean)
     found, moves = test.judgement, test.moves
-    if found is None:
-        raise RuntimeError(f"the test of seed {seed} came to no judgement: {test.over}")
     return Ended(
         seed=seed,
         kind=case.kind.value,
@@ -132,9 +131,9 @@ def judge(seed: int) -> Ended:
         law=case.loop.valve.law.word if case.f_s else "ideal",
         f_s=case.f_s,
         circumstances=case.circumstances,
-        verdict=found.verdict.value,
-        probability=found.probability,
-        interval=found.f_s_interval,
+        verdict="undecided" if found is None else found.verdict.value,
+        probability=math.nan if found is None else found.probability,
+        interval=(0.0, math.inf) if found is None else found.f_s_interval,
         moves=moves,
         duration=moves * facts.hold / case.time,
         beyond=max(float(away.max()) / case.noise, 0.0),

@@ -4,8 +4,8 @@ import platform
 
 from stiction_ros.config_files import find_config
 from stiction_ros.paper.grid_search import count_points
+from stiction_ros.paper.one_step_result import sustained_oscillations
 from stiction_ros.paper.search_log import PaperIdentification
-from stiction_ros.paper.sustained_oscillation import sustained_oscillations
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import printed_example
 from stiction_studies.paper.sources import Sources

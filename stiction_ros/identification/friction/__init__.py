@@ -1,1 +1,0 @@
-"""The frictions that are searched: the triangle of f_S and f_D, and further parameters."""

@@ -1,1 +1,0 @@
-"""From the best model to a verdict: intervals, units, what is exact."""

@@ -1,1 +1,0 @@
-"""The judgement of a valve: named figures, one probability, two cuts."""

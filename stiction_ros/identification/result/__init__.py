@@ -1,1 +1,0 @@
-"""What identification returns, as values."""

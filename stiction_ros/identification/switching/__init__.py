@@ -1,1 +1,0 @@
-"""Switching patterns: when a valve slips, and which frictions do that alike."""
