@@ -81,7 +81,8 @@ def decide(
     stranger = outside[0] if outside else None
     sure = bool(passed) and passed[0].evidence >= margin + SURE
     refused = passed[0] if sure and not confirmed(passed[0]) else None
-    lent = refused if stranger is None or _beats(refused, stranger) else None
+    beaten = refused and stranger and refused.evidence <= stranger.evidence
+    lent = None if beaten else refused
     if not kept:
         if stranger is not None and stranger.evidence >= 2.0 * margin:
             return _unknown(stranger, "nothing in the catalogue explains the gap", lent)
@@ -179,10 +180,6 @@ def _unknown(stranger: CandidateFit, reason: str, lent: CandidateFit | None) -> 
 
 def _would_explain(fit: CandidateFit) -> str:
     return f"{fit.candidate.name} would explain the gap by {fit.evidence:.0f}"
-
-
-def _beats(fit: CandidateFit | None, other: CandidateFit) -> bool:
-    return fit is not None and fit.evidence > other.evidence
 
 
 def _part(fit: CandidateFit, stranger: CandidateFit) -> bool:
