@@ -27,6 +27,7 @@ NORMAL = 1.96
 NOTHING = 1e-9  # of what is left, that a unit of a figure moves: nothing is known of it
 PROBE, LARGEST_STEP = 0.02, 0.5  # of an effect's figure: probe of its derivative, longest step
 NEAR = 0.99  # of the largest change, from which on a figure lies on its bound
+Tried = tuple[float, BoolArray, FloatArray, FloatArray, tuple[AddedEffect, ...]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,11 +148,9 @@ class _Search:
         self.probes = np.array([each.probe for each in self.figures])
 
     def run(self) -> bool:
-        """Step all figures, then each alone; several have to gain the margin over one.
-
-        Figures that trade off may hide the one that is wrong.
-        """
-        effects, found, count = self.effects, [], len(self.figures)
+        """Step all figures, then each alone, as they may trade off; several gain the margin."""
+        found: list[Tried] = []
+        effects, count = self.effects, len(self.figures)
         for free in (np.ones(count, dtype=bool), *np.eye(count, dtype=bool)):
             if found and np.array_equal(free, found[0][1]):
                 continue  # all but this one were let go
@@ -160,11 +159,10 @@ class _Search:
             if self._eliminate():
                 found.append(self._state())
         if found:
-            best = min(found, key=lambda each: each[0])
-            _, self.free, self.values, self.errors, self.effects = best
+            _, self.free, self.values, self.errors, self.effects = min(found, key=lambda e: e[0])
         return bool(found)
 
-    def _state(self) -> tuple[float, BoolArray, FloatArray, FloatArray, tuple[AddedEffect, ...]]:
+    def _state(self) -> Tried:
         """Return the figures as they are, after the BIC that they leave, several by the margin."""
         run = self._run(self.values)
         base = Baseline.of(run, columns=open_columns(run, self.effects))
