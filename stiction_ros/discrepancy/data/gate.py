@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.data.filled import OFTEN, drawn, held
+from stiction_ros.discrepancy.data.filled import drawn, held
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
@@ -99,13 +99,6 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
                 usable[i, rows] &= ~alone
                 lonely[i] += int(alone.sum())
                 notes.append(f"{int(alone.sum())} samples of {name} stand alone and are not scored")
-            again = _again(values, quantum, usable[i, rows])
-            if again.any():
-                usable[i, rows] &= ~again
-                notes.append(
-                    f"{int(again.sum())} samples of {name} repeat the one before to the last digit "
-                    "and are not scored"
-                )
             if rounded:
                 continue
             lines, again = drawn(values, quantum), held(values, quantum, usable[i, rows])
@@ -299,19 +292,6 @@ def _surprise(runs: Runs, output: int) -> float:
     if not rows.any():
         return math.inf
     return float(np.std(whiten(values, best_autoregression(values, rows, MAX_ORDER)[0])[rows]))
-
-
-def _again(values: FloatArray, quantum: float, usable: BoolArray) -> BoolArray:
-    """Return samples that repeat the one before, of values that hardly ever do: they were held.
-
-    None of rounded values, which rest anyway, and of those that are held so often that all evidence
-    counts less for it.
-    """
-    found = np.zeros(len(values), dtype=bool)
-    if quantum > 0.0:
-        return found
-    found[1:] = (np.diff(values) == 0.0) & usable[1:] & usable[:-1]
-    return found if np.mean(found) <= OFTEN else np.zeros_like(found)
 
 
 def _alone(values: FloatArray) -> BoolArray:

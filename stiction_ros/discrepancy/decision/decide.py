@@ -85,9 +85,8 @@ def decide(
     stranger = outside[0] if outside else None
     sure = bool(passed) and passed[0].evidence >= margin + SURE
     refused = passed[0] if sure and not confirmed(passed[0]) else None
-    lent = refused
-    if refused is not None and stranger is not None and refused.evidence <= stranger.evidence:
-        lent = None
+    beaten = refused and stranger and refused.evidence <= stranger.evidence
+    lent = None if beaten else refused
     if not kept:
         if stranger is not None and stranger.evidence >= 2.0 * margin:
             return _unknown(stranger, "nothing in the catalogue explains the gap", lent)

@@ -60,7 +60,6 @@ class Baseline:
     def of(
         cls,
         run: FreeRun,
-        gap: FloatArray | None = None,
         columns: Sequence[FloatArray] | None = None,
         like: Sequence[Mapping[int, NoiseFit]] = (),
     ) -> "Baseline":
@@ -68,11 +67,10 @@ class Baseline:
 
         Args:
             run: its free run.
-            gap: shape (N, p), in place of the recorded one.
             columns: per output what every fit projects out, shape (N, q), in place of the run's.
             like: noises per output with which the search for its own begins, too.
         """
-        gap = run.gap if gap is None else gap
+        gap = run.gap
         shared = tuple(run.free if columns is None else columns)
         blocks = tuple(run.blocks(i) for i in range(gap.shape[1]))
         seen = seen_noise(run.model, run.runs.lattices, run.runs.unseen)

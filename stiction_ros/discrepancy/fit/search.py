@@ -168,13 +168,9 @@ class _Search:
         return found
 
     def refine(self, centre: FloatArray, size: float, under: Under | None = None) -> None:
-        """Search smaller and smaller grids around a point.
+        """Search smaller and smaller grids, the first of ``size`` of its steps, around a point.
 
-        Args:
-            centre: coordinates of the search, shape (axes,).
-            size: of the first one, in steps of the first grid.
-            under: noise under which the points of a grid are compared; None for that of the
-                best one so far.
+        Their points are compared ``under`` a noise, None for that of the best one so far.
         """
         if not self.candidate.axes:
             self._try(self.candidate.grid())

@@ -65,7 +65,6 @@ class NoiseFit:
     # −2 log likelihood of the held-out rows with the trained figures; innovations beyond 5 σ count
     # as 5 σ, so that no single row outweighs all others
     held_minus_two_log: float
-    held_rows: int  # their number
     price: float  # what its φ cost in BIC; nothing for those that the model declares
     enlarged: bool = False  # whether it is another noise than the one that the model declares
     # φ of the autoregression that it is better than; None where it is one itself
@@ -211,7 +210,6 @@ def _result(
         rows * (log + 1.0),
         rows,
         held * log + outside / variance,
-        held,
         count * math.log(max(rows, 2)),
     )
 

@@ -27,6 +27,7 @@ NORMAL = 1.96
 NOTHING = 1e-9  # of what is left, that a unit of a figure moves: nothing is known of it
 PROBE, LARGEST_STEP = 0.02, 0.5  # of an effect's figure: probe of its derivative, longest step
 NEAR = 0.99  # of the largest change, from which on a figure lies on its bound
+Tried = tuple[float, BoolArray, FloatArray, FloatArray, tuple[AddedEffect, ...]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,34 +146,23 @@ class _Search:
         self.most = np.array([each.most for each in self.figures])
         self.gains = np.array([each.what == GAIN for each in self.figures])
         self.probes = np.array([each.probe for each in self.figures])
-        self.free = np.ones(len(self.figures), dtype=bool)
-        self.values = np.zeros(len(self.figures))
-        self.errors = np.full(len(self.figures), np.inf)
 
     def run(self) -> bool:
-        """Step all figures, then each alone; several have to gain the margin over one.
-
-        Figures that trade off may hide the one that is wrong.
-        """
-        effects, found = self.effects, []
-        if self._eliminate():
-            found.append(self._state())
-        for k in range(len(self.figures)):
-            if found and self.free.sum() == 1 and self.free[k]:
-                continue
-            self.free, self.values = np.arange(len(self.figures)) == k, np.zeros(len(self.figures))
-            self.errors, self.effects = np.full(len(self.figures), np.inf), effects
-            self._settle()
-            bound = self._at_bound()
-            if abs(self.values[k]) > SURE * self.errors[k] and not bound.any():
+        """Step all figures, then each alone, as they may trade off; several gain the margin."""
+        found: list[Tried] = []
+        effects, count = self.effects, len(self.figures)
+        for free in (np.ones(count, dtype=bool), *np.eye(count, dtype=bool)):
+            if found and np.array_equal(free, found[0][1]):
+                continue  # all but this one were let go
+            self.free, self.effects = free, effects
+            self.values, self.errors = np.zeros(count), np.full(count, np.inf)
+            if self._eliminate():
                 found.append(self._state())
-        if not found:
-            return False
-        best = min(found, key=lambda each: each[0])
-        _, self.free, self.values, self.errors, self.effects = best
-        return True
+        if found:
+            _, self.free, self.values, self.errors, self.effects = min(found, key=lambda e: e[0])
+        return bool(found)
 
-    def _state(self) -> tuple[float, BoolArray, FloatArray, FloatArray, tuple[AddedEffect, ...]]:
+    def _state(self) -> Tried:
         """Return the figures as they are, after the BIC that they leave, several by the margin."""
         run = self._run(self.values)
         base = Baseline.of(run, columns=open_columns(run, self.effects))
@@ -187,7 +177,9 @@ class _Search:
         while self.free.any():
             self._settle()
             sure = np.where(self.free, np.abs(self.values) / self.errors, np.inf)
-            bound = self._at_bound()
+            bound = self.values >= NEAR * self.most
+            bound |= (self.values <= NEAR * self.least) & self.gains
+            bound &= self.free
             sure[bound & self._several()] = 0.0  # two lags that are alike trade off each other
             least = int(np.argmin(sure))
             if sure[least] > SURE:
@@ -195,15 +187,8 @@ class _Search:
             self.free[least], self.values[least], self.errors[least] = False, 0.0, np.inf
         return False
 
-    def _at_bound(self) -> BoolArray:
-        bound = self.values >= NEAR * self.most
-        bound |= (self.values <= NEAR * self.least) & self.gains
-        return np.asarray(bound & self.free)
-
     def _several(self) -> BoolArray:
-        kinds = [
-            each.what if free else "" for each, free in zip(self.figures, self.free, strict=True)
-        ]
+        kinds = [f.what if free else "" for f, free in zip(self.figures, self.free, strict=True)]
         return np.array([bool(kind) and kinds.count(kind) > 1 for kind in kinds])
 
     def _settle(self) -> None:

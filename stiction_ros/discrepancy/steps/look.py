@@ -185,12 +185,7 @@ def rests_left(run: FreeRun) -> Callable[[CandidateFit], int]:
 def _extended(
     task: Task, state: State, decision: Decision
 ) -> tuple[State, LoopModel, Extension | None]:
-    """Add the chosen effect to the model.
-
-    Returns:
-        The state that the effect is added to; the model without effects behind which it was
-        fitted; the extension, None where no effect may be added.
-    """
+    """Return the state, the model behind, and the extension by the chosen effect, if it may be."""
     chosen = decision.chosen
     lent = chosen is None and state.doubted is None and not task.options.process_fitted
     if lent:

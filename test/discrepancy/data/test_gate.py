@@ -146,16 +146,6 @@ def test_a_quantum_is_the_least_distance() -> None:
     assert quantum_of(0.25 * np.round(np.random.default_rng(1).normal(0, 5, 300))) == 0.25
 
 
-def test_few_values_that_repeat_exactly_were_held() -> None:
-    sound = record(loop())
-    pv = sound.pv.copy()
-    held = np.arange(100, 800, 70)
-    pv[held] = pv[held - 1]
-    gate = look_at_data(loop(), join_records(loop(), [dataclasses.replace(sound, pv=pv)]))
-    assert np.flatnonzero(~gate.usable[0]).tolist() == held.tolist()
-    assert any("repeat the one before" in note for note in gate.notes)
-
-
 def test_continuous_values_have_no_quantum() -> None:
     assert quantum_of(np.random.default_rng(1).normal(0, 5, 300)) == 0.0
 
