@@ -6,14 +6,16 @@ from evidence_loops import pi_loop
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stiction_ros.deferred import chi2_quantile
 from stiction_ros.identification.evidence.accepted import (
     BETWEEN,
+    FREEDOM,
     LATE,
+    MISFIT,
     OUTWARDS,
     Unseen,
     _beyond,
     _looked_at,
-    _slack,
     accepted,
     innovation,
 )
@@ -44,7 +46,8 @@ def test_a_band_ends_between_the_nodes_of_the_grids() -> None:
     rows, lost = _looked_at(judge, found)
     nodes = rows[:, :2].sum(axis=1)
     assert np.abs(nodes - held.band[0]).min() > 1e-3
-    assert held.band[0] < nodes[lost <= lost.min() + _slack(held.gain, 0.95)].min()
+    slack = chi2_quantile(0.95, FREEDOM) + MISFIT * held.gain
+    assert held.band[0] < nodes[lost <= lost.min() + slack].min()
 
 
 SHARES = st.floats(0.0, 1.0)
