@@ -8,7 +8,7 @@ from typing import Any
 from stiction_ros.online.unit import UnitScenario
 from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT
-from stiction_ros.records.run.log import read_run
+from stiction_ros.records.run.log import RunLog, read_run
 from stiction_ros.report.page import Cell, duration, number, page_file, table
 from stiction_ros.report.run.figures import whole_run
 from stiction_ros.report.run.identified import KINDS, valve_cards
@@ -16,7 +16,7 @@ from stiction_ros.report.run.page import findings
 from stiction_ros.report.run.scoring import Phase, PhaseStatus, errors, phases
 from stiction_ros.report.run.story import Story, tell
 from stiction_ros.report.run.summary import summary, write_json
-from stiction_ros.signals.oscillation import amplitude
+from stiction_ros.signals.oscillation import amplitude, pieces
 from stiction_ros.survey.neighbours import Neighbours, is_outer, neighbours
 
 UNIT_COLUMNS = (
@@ -64,8 +64,26 @@ def report_unit(
     Raises:
         InputError: as :func:`stiction_ros.records.run.log.read_run`.
     """
-    told = {name.strip("/"): tell(read_run(bag, namespace=name), name=name) for name in loops}
-    name = Path(bag).name if scenario is None else scenario.name
+    logs = {name.strip("/"): read_run(bag, namespace=name) for name in loops}
+    report = unit_report(logs, Path(bag).name if scenario is None else scenario.name, scenario)
+    target, folder = page_file(out)
+    target.write_text(unit_page(report), encoding="utf-8")
+    if folder is not None:
+        write_json(unit_summary(report, seconds), folder / "summary.json")
+    return dataclasses.replace(report, page=target)
+
+
+def unit_report(
+    logs: Mapping[str, RunLog], name: str, scenario: UnitScenario | None = None
+) -> UnitReport:
+    """Return what is said of several loops, by their logs; nothing is written.
+
+    Args:
+        logs: of the loops, by name.
+        name: of the run.
+        scenario: that was run, for what is known of the plant.
+    """
+    told = {one: tell(log, name=one) for one, log in logs.items()}
     swaps = {n: k for n, one in told.items() if (k := one.log.swap_sample) is not None}
     swapped = min(swaps, key=lambda n: swaps[n], default="")
     swap = swaps.get(swapped)
@@ -84,12 +102,7 @@ def report_unit(
     found = neighbours(
         {n: one.record.part(0, swap or len(one.record)) for n, one in stories.items()}
     )
-    report = UnitReport(name, stories, swapped, found)
-    target, folder = page_file(out)
-    target.write_text(unit_page(report), encoding="utf-8")
-    if folder is not None:
-        write_json(unit_summary(report, seconds), folder / "summary.json")
-    return dataclasses.replace(report, page=target)
+    return UnitReport(name, stories, swapped, found)
 
 
 def unit_summary(report: UnitReport, seconds: float | None = None) -> dict[str, Any]:
@@ -137,7 +150,8 @@ def cycle_of(story: Story, phase: Phase | None, period: float | None) -> float |
     if phase is None or period is None:
         return None
     error = errors(story.record)[0][phase.first : phase.last, 0]
-    return amplitude(error, [(0, len(error))], period / story.record.sample_time)
+    samples = period / story.record.sample_time
+    return amplitude(error, pieces([(0, len(error))], samples), samples)
 
 
 def unit_rows(report: UnitReport) -> list[list[Cell]]:
