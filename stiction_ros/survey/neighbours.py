@@ -141,14 +141,9 @@ def _judged_beside(entry: Entry, own: Record, others: Sequence[Record]) -> Entry
     found = identify(longest_part((joint,))).valves[: len(own.valves)]
     if any(valve.verdict.has_friction for valve in found):
         return entry
-    likely = max(found, key=lambda valve: valve.probability or 0.0)
-    return dataclasses.replace(
-        entry,
-        verdict=likely.verdict.value,
-        cause="disturbance",
-        probability=likely.probability,
-        evidence=likely.evidence,
-    )
+    one = max(found, key=lambda valve: valve.probability or 0.0)
+    told = dataclasses.replace(entry, verdict=one.verdict.value, probability=one.probability)
+    return dataclasses.replace(told, cause="disturbance", evidence=one.evidence)
 
 
 def _behind(source: Entry, other: Entry) -> float:

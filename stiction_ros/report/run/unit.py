@@ -76,13 +76,7 @@ def report_unit(
 def unit_report(
     logs: Mapping[str, RunLog], name: str, scenario: UnitScenario | None = None
 ) -> UnitReport:
-    """Return what is said of several loops, by their logs; nothing is written.
-
-    Args:
-        logs: of the loops, by name.
-        name: of the run.
-        scenario: that was run, for what is known of the plant.
-    """
+    """Return what is said of several loops, by their logs; arguments as in :func:`report_unit`."""
     told = {one: tell(log, name=one) for one, log in logs.items()}
     swaps = {n: k for n, one in told.items() if (k := one.log.swap_sample) is not None}
     swapped = min(swaps, key=lambda n: swaps[n], default="")
