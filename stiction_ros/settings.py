@@ -18,29 +18,18 @@ T = TypeVar("T")
 
 @dataclasses.dataclass(frozen=True)
 class Setting:
-    """One setting.
+    """One setting."""
 
-    Attributes:
-        name: key in a parameter file and name of the ROS parameter.
-        kind: ``float``, ``int``, ``bool``, ``str``, ``floats`` or ``strings``.
-        default: value when not given.
-        description: one line for people.
-        low, high: closed range of numbers (of each element of a list).
-        choices: accepted texts; empty for any.
-        fixed: whether it cannot change while the node is configured.
-        once: whether it is read only when the process starts.
-        beside: name and value of another setting, without which this one has no effect.
-    """
-
-    name: str
-    kind: str
-    default: Any
-    description: str
-    low: float
+    name: str  # key in a parameter file and name of the ROS parameter
+    kind: str  # ``float``, ``int``, ``bool``, ``str``, ``floats`` or ``strings``
+    default: Any  # value when not given
+    description: str  # one line for people
+    low: float  # low, high: closed range of numbers (of each element of a list)
     high: float
-    choices: tuple[str, ...]
-    fixed: bool
-    once: bool
+    choices: tuple[str, ...]  # accepted texts; empty for any
+    fixed: bool  # whether it cannot change while the node is configured
+    once: bool  # whether it is read only when the process starts
+    # name and value of another setting, without which this one has no effect
     beside: tuple[str, str]
 
 

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 OPCUA = "opcua"
 OPCUA_HELP = "; opcua: the tank behind a control system"
 
+# Scores of a phase that are printed, and what they are called
 SCORES = {"amplitude": "amplitude", "offset": "offset", "iae_per_hour": "IAE per hour"}
-"""Scores of a phase that are printed, and what they are called."""
 
 
 def add(commands: Any) -> None:
@@ -156,25 +156,22 @@ def _print(summary: dict[str, Any], directory: Path) -> None:
             for v in summary["valves"]
         )
         console.print(f"{name}: swapped at {summary['swap_time']:.0f} s; {valves}")
-    table = Table(title=f"{name}, {summary['samples']} samples", title_justify="left")
-    for column in ("output", "", "before", "after", "stiction-free"):
-        table.add_column(column)
+    head = ("output", "", "before", "after", "stiction-free")
+    table = Table(*head, title=f"{name}, {summary['samples']} samples", title_justify="left")
     phases = summary["phases"]
-    for output in phases.get("before", {}):
-        for key in SCORES:
-            values = [
-                phases.get(phase, {}).get(output, {}).get(key)
-                for phase in ("before", "after", "stiction_free")
-            ]
-            cells = ["–" if value is None else f"{value:.4g}" for value in values]
-            table.add_row(output, SCORES[key], *cells)
-    for valve, label, told in work_rows(summary, ("before", "after", "stiction_free")):
-        table.add_row(valve, label, *("–" if value is None else f"{value:.4g}" for value in told))
+    order = ("before", "after", "stiction_free")
+    rows = [
+        (output, label, [phases.get(phase, {}).get(output, {}).get(key) for phase in order])
+        for output in phases.get("before", {})
+        for key, label in SCORES.items()
+    ]
+    for tag, label, told in [*rows, *work_rows(summary, order)]:
+        table.add_row(tag, label, *("–" if value is None else f"{value:.4g}" for value in told))
     console.print(table)
     if summary["pv_to_op_ms"]:
         times = ", ".join(f"{key} {value:.3g}" for key, value in summary["pv_to_op_ms"].items())
-        load = summary["load_before"]
-        console.print(f"{name}: PV to OP in ms: {times}; load {load:.2f} before the run")
+        load = f"load {summary['load_before']:.2f} before the run"
+        console.print(f"{name}: PV to OP in ms: {times}; {load}")
     for topic, count in summary["messages"].items():
         lost = (count["published"] or 0) - count["recorded"]
         if lost > 0:

@@ -50,9 +50,8 @@ def _print(bag: str, found: "Replay") -> None:
     from stiction_ros.online.replays.result import Match
 
     console = Console()
-    table = Table(title=f"{bag}: {found.samples} samples", title_justify="left")
-    for column in ("window ends", "valves", "replayed and recorded"):
-        table.add_column(column)
+    head = ("window ends", "valves", "replayed and recorded")
+    table = Table(*head, title=f"{bag}: {found.samples} samples", title_justify="left")
     for fit in found.fits:
         said = str(fit.match).replace("_", " ") + (f": {fit.difference}" if fit.difference else "")
         table.add_row(f"{found.seconds(fit.fit.stamp):.9g} s", _valves(fit), said)

@@ -11,17 +11,11 @@ ON_BOUND = 1e-3  # of the range of a search, from its ends
 
 @dataclasses.dataclass(frozen=True)
 class Seen:
-    """The signal that an effect would act on, as the records show it.
+    """The signal that an effect would act on, as the records show it."""
 
-    Attributes:
-        values: of all records, shape (N,).
-        fastest: its largest move per second.
-        sample_time: s.
-    """
-
-    values: FloatArray
-    fastest: float
-    sample_time: float
+    values: FloatArray  # of all records, shape (N,)
+    fastest: float  # its largest move per second
+    sample_time: float  # s
 
     @property
     def duration(self) -> float:
@@ -44,24 +38,17 @@ class Axis:
 
     Where the best figures are a needle in a valley, as those of a law that slips, a lattice may
     miss them: give more ``points``, or axes along and across the valley.
-
-    Attributes:
-        low, high: ends.
-        points: of the first grid.
-        logarithmic: whether the points are in proportion.
-        whole: whether only whole numbers count.
-        linear: whether the response is a straight line in it, so that its best value is the
-            vertex of a parabola.
-        natural: whether its ends are values like all others, no bounds of the search.
     """
 
-    low: float
+    low: float  # low, high: ends
     high: float
-    points: int
-    logarithmic: bool = False
-    whole: bool = False
+    points: int  # of the first grid
+    logarithmic: bool = False  # whether the points are in proportion
+    whole: bool = False  # whether only whole numbers count
+    # whether the response is a straight line in it, so that its best value is the vertex of a
+    # parabola
     linear: bool = False
-    natural: bool = False
+    natural: bool = False  # whether its ends are values like all others, no bounds of the search
 
     def grid(self) -> FloatArray:
         """Return the first grid, in coordinates of the search."""

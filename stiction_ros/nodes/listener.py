@@ -109,8 +109,7 @@ class Listener:
 
     def run(self, seconds: float, progress: Callable[[float], None]) -> None:
         """Listen for ``seconds``."""
-        begin = time.monotonic()
-        search = begin
+        begin = search = time.monotonic()
         while (now := time.monotonic()) - begin < seconds:
             if now >= search:
                 self._find_loops()

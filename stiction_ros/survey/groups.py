@@ -78,8 +78,8 @@ def grouped(entries: Sequence[Entry]) -> tuple[list[Entry], list[Group]]:
     times = [np.array(entry.beats) for entry in entries]
     # What two loops must share for their times to compare: dates, else their files.
     clocks = ["dates" if e.beats and e.beats[0] > DATES else e.files for e in entries]
-    cycling = [k for k, entry in enumerate(entries) if len(entry.beats) and _period(entry) > 0.0]
-    cycling.sort(key=lambda k: _period(entries[k]))
+    turns = [float(np.median(np.diff(each))) if len(each) > 1 else 0.0 for each in times]
+    cycling = sorted((k for k, turn in enumerate(turns) if turn > 0.0), key=turns.__getitem__)
     parent = list(range(len(entries)))
 
     def root(k: int) -> int:
@@ -90,7 +90,7 @@ def grouped(entries: Sequence[Entry]) -> tuple[list[Entry], list[Group]]:
 
     for place, one in enumerate(cycling):
         for other in cycling[place + 1 :]:
-            if math.log(_period(entries[other]) / _period(entries[one])) > 2.0 * ALIKE:
+            if math.log(turns[other] / turns[one]) > ALIKE:
                 break
             if root(one) == root(other) or clocks[one] != clocks[other]:
                 continue

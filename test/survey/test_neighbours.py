@@ -1,8 +1,10 @@
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from stiction_ros.identification import VerdictKind
 from stiction_ros.records import Record
 from stiction_ros.survey import neighbours as module
 from stiction_ros.survey.assess import Assessed
@@ -61,6 +63,22 @@ def test_a_loop_of_another_period_is_not_disturbed(monkeypatch: pytest.MonkeyPat
     found = judged(monkeypatch, entry("A", "sticky", "valve"), other)
     assert found.disturbed == ()
     assert found.sentences[0] == "Service VA and A stops cycling."
+
+
+def test_a_valve_that_sticks_only_where_its_loop_is_judged_alone_is_disturbed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def explained(record: Record) -> SimpleNamespace:
+        names = VerdictKind.STICKY, VerdictKind.HEALTHY
+        kinds = [names[valve != "VA"] for valve in record.valves]
+        valves = [SimpleNamespace(verdict=k, probability=0.1, evidence={}) for k in kinds]
+        return SimpleNamespace(valves=valves)
+
+    monkeypatch.setattr(module, "identify", explained)
+    found = judged(monkeypatch, entry("B", "sticky", "valve"), entry("A", "sticky", "valve"))
+    assert found.sources == {"A": "VA"}
+    assert found.entries["B"].verdict == "healthy"
+    assert "by its own signals its valve seems sticky" in found.sentences[2]
 
 
 def test_no_valve_is_named_where_none_makes_the_cycle(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -41,19 +41,13 @@ class JumpForm:
     K = 1 except for the semi-physical law; below 1 a slip falls short of its end. Kano's law and
     the reconstruction of XCH's also let a stem that moved at the last sample go on by less than
     that; this is not used.
-
-    Attributes:
-        law: the behaviour it was taken from.
-        static_friction, dynamic_friction: f_S and f_D, %.
-        overshoot: K, above 0.
-        strokes: samples in which OP must go the same way until the stem slips.
     """
 
-    law: "Stiction"
-    static_friction: float
+    law: "Stiction"  # the behaviour it was taken from
+    static_friction: float  # static_friction, dynamic_friction: f_S and f_D, %
     dynamic_friction: float
-    overshoot: float = 1.0
-    strokes: int = 1
+    overshoot: float = 1.0  # K, above 0
+    strokes: int = 1  # samples in which OP must go the same way until the stem slips
 
     @property
     def least(self) -> float:

@@ -21,28 +21,16 @@ CLEARED = 0.05  # a healthy window exceeds the limit of the way back this often
 
 @dataclasses.dataclass(frozen=True)
 class OutputBaseline:
-    r"""Noise of one output in the baseline, by which later windows are judged.
+    """Noise of one output in the baseline, by which later windows are judged."""
 
-    Attributes:
-        name: tag.
-        ar: φ of the AR noise of the free run's residual, shape (p,).
-        std: s₀, standard deviation of its innovations, units of the output.
-        freedom: degrees of freedom that s₀² is worth,
-
-            .. math:: \nu_0 = \min(n_0 - q,\ 2 s_0^4 / \mathrm{Var}\, s_0^2)
-
-            with the variance of the mean square taken from :data:`BATCHES` batches, so that
-            heavy tails and a gap that comes in bursts widen the limit.
-        rows: n₀.
-        floor: standard deviation of the noise in a free run, units of the output.
-    """
-
-    name: str
-    ar: FloatArray
-    std: float
+    name: str  # tag
+    ar: FloatArray  # φ of the AR noise of the free run's residual, shape (p,)
+    std: float  # s₀, standard deviation of its innovations, units of the output
+    # degrees of freedom that s₀² is worth, min(n₀ − q, 2 s₀⁴ / Var s₀²); the variance of the mean
+    # square is taken from BATCHES batches, so that heavy tails and bursts widen the limit
     freedom: float
-    rows: int
-    floor: float
+    rows: int  # n₀
+    floor: float  # standard deviation of the noise in a free run, units of the output
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 from stiction_ros.online.unit import UnitScenario
 from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT
-from stiction_ros.records.run.log import read_run
+from stiction_ros.records.run.log import RunLog, read_run
 from stiction_ros.report.page import Cell, duration, number, table, write_page
 from stiction_ros.report.run.figures import whole_run
 from stiction_ros.report.run.identified import KINDS, valve_cards
@@ -16,7 +16,7 @@ from stiction_ros.report.run.report import findings
 from stiction_ros.report.run.scoring import Phase, PhaseStatus, errors, phases
 from stiction_ros.report.run.story import Story, tell
 from stiction_ros.report.run.summary import summary
-from stiction_ros.signals.oscillation import amplitude
+from stiction_ros.signals.oscillation import amplitude, pieces
 from stiction_ros.survey.neighbours import Neighbours, is_outer, neighbours
 
 UNIT_COLUMNS = (
@@ -56,7 +56,15 @@ def report_unit(bag: Path, out: Path, scenario: UnitScenario, seconds: float) ->
     Raises:
         InputError: as :func:`stiction_ros.records.run.log.read_run`.
     """
-    told = {name: tell(read_run(bag, namespace=name), name=name) for name in scenario.members}
+    logs = {name: read_run(bag, namespace=name) for name in scenario.members}
+    report = unit_report(logs, scenario)
+    page = write_page(out, unit_page(report), unit_summary(report, seconds))
+    return dataclasses.replace(report, page=page)
+
+
+def unit_report(logs: Mapping[str, RunLog], scenario: UnitScenario) -> UnitReport:
+    """Return what is said of the loops of a scenario, by their logs."""
+    told = {one: tell(log, name=one) for one, log in logs.items()}
     swaps = {n: k for n, one in told.items() if (k := one.log.swap_sample) is not None}
     swapped = min(swaps, key=lambda n: swaps[n], default="")
     swap = swaps.get(swapped)
@@ -71,9 +79,7 @@ def report_unit(bag: Path, out: Path, scenario: UnitScenario, seconds: float) ->
     found = neighbours(
         {n: one.record.part(0, swap or len(one.record)) for n, one in stories.items()}
     )
-    report = UnitReport(scenario.name, stories, swapped, found)
-    page = write_page(out, unit_page(report), unit_summary(report, seconds))
-    return dataclasses.replace(report, page=page)
+    return UnitReport(scenario.name, stories, swapped, found)
 
 
 def unit_summary(report: UnitReport, seconds: float) -> dict[str, Any]:
@@ -121,7 +127,8 @@ def cycle_of(story: Story, phase: Phase | None, period: float | None) -> float |
     if phase is None or period is None:
         return None
     error = errors(story.record)[0][phase.first : phase.last, 0]
-    return amplitude(error, [(0, len(error))], period / story.record.sample_time)
+    samples = period / story.record.sample_time
+    return amplitude(error, pieces([(0, len(error))], samples), samples)
 
 
 def unit_rows(report: UnitReport) -> list[list[Cell]]:

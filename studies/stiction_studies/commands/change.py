@@ -30,25 +30,18 @@ QUIET = 0.15  # amplitude of the cycle after a growth, over that without a swap
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """One seed.
+    """One seed."""
 
-    Attributes:
-        seed: of the noise.
-        good: whether the loop did what is asked of it.
-        noticed: samples from the change to the first sample of a controller that knows it, None
-            when there was none.
-        moves: moves of the stem estimate in the meantime, or since the change.
-        mode, static_friction: trusted at the end; f_S in %, None without friction.
-        amplitude: of the cycle in the last round over that which the same seed has under the
-            unaware controller with the friction from before the change, by output.
-    """
-
-    seed: int
-    good: bool
+    seed: int  # of the noise
+    good: bool  # whether the loop did what is asked of it
+    # samples from the change to the first sample of a controller that knows it, None when there was
+    # none
     noticed: int | None
-    moves: int
-    mode: str
+    moves: int  # moves of the stem estimate in the meantime, or since the change
+    mode: str  # mode, static_friction: trusted at the end; f_S in %, None without friction
     static_friction: float | None
+    # of the cycle in the last round over that which the same seed has under the unaware controller
+    # with the friction from before the change, by output
     amplitude: dict[str, float]
 
 

@@ -26,32 +26,22 @@ CYCLE_LIMIT = 0.15  # of the amplitude that the unaware controller leaves
 
 @dataclasses.dataclass(frozen=True)
 class CaseScores:
-    """One case over all seeds; outputs C and T in this order.
+    """One case over all seeds; outputs C and T in this order."""
 
-    Attributes:
-        case: its name.
-        iae_ratio: mean IAE over that of the stiction-free loop.
-        iae_limit: what is asked for, or None.
-        offset: mean |error| at the end of the holds, in kg/m³ and °C.
-        cycle: amplitude at the period of the unaware controller's cycle, as a share of its.
-        late_turns: most turns of a stem in the last 60 samples of a hold.
-        moves, travel, reversals: of the sticky stems in a run, means; travel in %.
-        travel_ratio, moves_ratio: the first two over those of the unaware controller.
-        op_step: largest move of OP from one sample to the next, %.
-    """
-
-    case: str
-    iae_ratio: tuple[float, float]
-    iae_limit: float | None
-    offset: tuple[float, float]
+    case: str  # its name
+    iae_ratio: tuple[float, float]  # mean IAE over that of the stiction-free loop
+    iae_limit: float | None  # what is asked for, or None
+    offset: tuple[float, float]  # mean |error| at the end of the holds, in kg/m³ and °C
+    # amplitude at the period of the unaware controller's cycle, as a share of its
     cycle: tuple[float, float]
-    late_turns: int
-    moves: float
+    late_turns: int  # most turns of a stem in the last 60 samples of a hold
+    moves: float  # moves, travel, reversals: of the sticky stems in a run, means; travel in %
     travel: float
     reversals: float
+    # travel_ratio, moves_ratio: the first two over those of the unaware controller
     travel_ratio: float
     moves_ratio: float
-    op_step: float
+    op_step: float  # largest move of OP from one sample to the next, %
 
     @property
     def met(self) -> bool:

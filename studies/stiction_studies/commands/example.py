@@ -41,23 +41,16 @@ VARIANTS = {
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """What to make and how to identify it.
+    """What to make and how to identify it."""
 
-    Attributes:
-        name, variant: of the example.
-        output_order, input_order: in place of the example's own, None to keep them.
-        method: search of the identification.
-        samples: length of the record, None for the example's own.
-        chosen: options of that search alone.
-    """
-
-    name: str
+    name: str  # name, variant: of the example
     variant: str
+    # output_order, input_order: in place of the example's own, None to keep them
     output_order: int | None = None
     input_order: int | None = None
-    method: str = "exact"
-    samples: int | None = None
-    chosen: dict[str, Any] = dataclasses.field(default_factory=dict)
+    method: str = "exact"  # search of the identification
+    samples: int | None = None  # length of the record, None for the example's own
+    chosen: dict[str, Any] = dataclasses.field(default_factory=dict)  # options of that search alone
 
     def make(self, seed: int) -> "Example":
         """Return the example of one seed with the orders chosen."""

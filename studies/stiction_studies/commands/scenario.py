@@ -10,6 +10,7 @@ from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.cli.shared.scenarios import find
+from stiction_studies.commands import unit
 from stiction_studies.seeds import add_jobs, run_seeds, seed_range
 
 if TYPE_CHECKING:
@@ -20,15 +21,10 @@ WIDTH = 132  # characters that the table needs
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """One seed.
+    """One seed."""
 
-    Attributes:
-        seed: of the noise.
-        summary: as in ``summary.json`` of the demo.
-    """
-
-    seed: int
-    summary: dict[str, Any]
+    seed: int  # of the noise
+    summary: dict[str, Any]  # as in ``summary.json`` of the demo
 
     def ratio(self, output: str, key: str, baseline: str) -> float:
         """Return a score of ``after`` over that of another phase; NaN when there is none."""
@@ -56,7 +52,7 @@ def add(commands: Any) -> None:
         "print what was identified and what the swap gained. Exit code 1 when a run with "
         "sticky valves was not swapped, or one with ideal valves was.",
     )
-    parser.add_argument("scenario", metavar="SCENARIO", help="tank, siso, or a file")
+    parser.add_argument("scenario", metavar="SCENARIO", help="a scenario of demo, or a file")
     parser.add_argument(
         "--seeds",
         type=seed_range,
@@ -86,8 +82,11 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     path = find(options.scenario)
     from stiction_ros.online.session import Scenario
+    from stiction_ros.online.unit import load_scenario
 
-    scenario = Scenario.load(path)
+    scenario = load_scenario(path)
+    if not isinstance(scenario, Scenario):
+        return unit.run(scenario, options)
     work = functools.partial(run_seed, scenario, ideal_valves=options.ideal_valves)
     outcomes = run_seeds(work, options.seeds, options.jobs, scenario.name)
     hand_over(
