@@ -33,17 +33,11 @@ AWARE = ("embedding", "inversion")
 
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """How cases are run.
+    """How cases are run."""
 
-    Attributes:
-        seed: of the plant's noise.
-        speed: simulated seconds per second of realtime pace.
-        two: whether a second loop runs beside it, which the fault must not reach.
-    """
-
-    seed: int = 1
-    speed: float = 25.0
-    two: bool = False
+    seed: int = 1  # of the plant's noise
+    speed: float = 25.0  # simulated seconds per second of realtime pace
+    two: bool = False  # whether a second loop runs beside it, which the fault must not reach
 
 
 def run_case(

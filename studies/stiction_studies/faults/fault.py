@@ -11,42 +11,32 @@ from stiction_studies.faults.terms import BOTH_PACES, BOTH_PHASES, Bag, Notice, 
 
 @dataclasses.dataclass(frozen=True)
 class Fault:
-    """One row of the suite.
+    """One row of the suite."""
 
-    Attributes:
-        name: by which ``stiction faults --only`` knows it.
-        expected: outcome, one sentence.
-        put: does it to a running loop and returns when it is over; what it finds wrong by
-            itself it tells by :meth:`.RunningLoop.remark`.
-        paces, phases: in which it means something.
-        notices: diagnostics that must show it.
-        ends: paces in which the loop may end with a clear sentence instead of going on.
-        silence: longest time without a new OP while it lasts, s; infinite where it stops the
-            loop by its nature.
-        recovery: s from its end until OP must flow again.
-        bag: what is expected of the bag.
-        swaps: whether the controller may take a friction before the swap, so that its moves are
-            those of afterwards.
-        forgets: whether the controller may lose what it knew of the friction.
-        from_start: it is there from the start, and ``put`` has nothing to do.
-        parameters: of nodes, in place of the usual ones.
-        relayed: topics that go through the suite, which may lose or change their messages.
-    """
-
-    name: str
-    expected: str
+    name: str  # by which ``stiction faults --only`` knows it
+    expected: str  # outcome, one sentence
+    # does it to a running loop and returns when it is over; what it finds wrong by itself it
+    # tells by :meth:`.RunningLoop.remark`
     put: Callable[[RunningLoop], None]
+    # paces, phases: in which it means something
     paces: tuple[Pace, ...] = BOTH_PACES
     phases: tuple[Phase, ...] = BOTH_PHASES
-    notices: tuple[Notice, ...] = ()
+    notices: tuple[Notice, ...] = ()  # diagnostics that must show it
+    # paces in which the loop may end with a clear sentence instead of going on
     ends: tuple[Pace, ...] = ()
+    # longest time without a new OP while it lasts, s; infinite where it stops the loop by its
+    # nature
     silence: float = 1.0
-    recovery: float = 5.0
-    bag: Bag = Bag.WHOLE
+    recovery: float = 5.0  # s from its end until OP must flow again
+    bag: Bag = Bag.WHOLE  # what is expected of the bag
+    # whether the controller may take a friction before the swap, so that its moves are those
+    # of afterwards
     swaps: bool = False
-    forgets: bool = False
-    from_start: bool = False
+    forgets: bool = False  # whether the controller may lose what it knew of the friction
+    from_start: bool = False  # it is there from the start, and ``put`` has nothing to do
+    # of nodes, in place of the usual ones
     parameters: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
+    # topics that go through the suite, which may lose or change their messages
     relayed: tuple[str, ...] = ()
 
     @property

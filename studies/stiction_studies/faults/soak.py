@@ -53,23 +53,16 @@ class Memory:
 
 @dataclasses.dataclass(frozen=True)
 class Soaked:
-    """How a long run went.
+    """How a long run went."""
 
-    Attributes:
-        samples, seconds: how long it was.
-        missed: samples that were missed, by node and key.
-        told: what else the nodes have counted, by node and key.
-        kept: most samples of the past that a node keeps.
-        memory: of every node.
-        failures: nodes that ended when they should not have, a run that stood still.
-    """
-
+    # samples, seconds: how long it was
     samples: int
     seconds: float
-    missed: Mapping[str, int]
-    told: Mapping[str, str]
-    kept: Mapping[str, int]
-    memory: Mapping[str, Memory]
+    missed: Mapping[str, int]  # samples that were missed, by node and key
+    told: Mapping[str, str]  # what else the nodes have counted, by node and key
+    kept: Mapping[str, int]  # most samples of the past that a node keeps
+    memory: Mapping[str, Memory]  # of every node
+    # nodes that ended when they should not have, a run that stood still
     failures: tuple[str, ...] = ()
 
     @property

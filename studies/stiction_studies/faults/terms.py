@@ -33,16 +33,9 @@ LEVELS = ("ok", "warn", "error")
 
 @dataclasses.dataclass(frozen=True)
 class Notice:
-    """A diagnostic that must show the fault, and end with it unless it ``stays``.
+    """A diagnostic that must show the fault, and end with it unless it ``stays``."""
 
-    Attributes:
-        node: whose status.
-        level: warn or error; a worse one will do.
-        paces: in which it is expected.
-        stays: whether it may be shown for as long as the run lasts.
-    """
-
-    node: str
-    level: str
-    paces: tuple[Pace, ...] = BOTH_PACES
-    stays: bool = False
+    node: str  # whose status
+    level: str  # warn or error; a worse one will do
+    paces: tuple[Pace, ...] = BOTH_PACES  # in which it is expected
+    stays: bool = False  # whether it may be shown for as long as the run lasts

@@ -20,33 +20,22 @@ SHARE = 0.1  # by which a known friction may differ after the fault
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """The verdict of one case.
+    """The verdict of one case."""
 
-    Attributes:
-        fault, pace, phase: which.
-        beyond: largest move of OP beyond what is allowed, %.
-        without: longest time without a new OP, s.
-        noticed: until the last of its diagnostics was shown, s; None for none.
-        recovered: from the end of the fault until OP flowed again, s; None for never.
-        gone: until the last of its diagnostics had ended, s; None for none.
-        ended: whether the loop ended with a clear sentence.
-        bag: whether the bag is as expected.
-        reasons: why it fails; empty for a pass.
-        seconds: that the case took.
-    """
-
+    # fault, pace, phase: which
     fault: str
     pace: Pace
     phase: Phase
-    beyond: float = math.nan
-    without: float = math.nan
-    noticed: float | None = None
+    beyond: float = math.nan  # largest move of OP beyond what is allowed, %
+    without: float = math.nan  # longest time without a new OP, s
+    noticed: float | None = None  # until the last of its diagnostics was shown, s; None for none
+    # from the end of the fault until OP flowed again, s; None for never
     recovered: float | None = None
-    gone: float | None = None
-    ended: bool = False
-    bag: bool = False
-    reasons: tuple[str, ...] = ()
-    seconds: float = 0.0
+    gone: float | None = None  # until the last of its diagnostics had ended, s; None for none
+    ended: bool = False  # whether the loop ended with a clear sentence
+    bag: bool = False  # whether the bag is as expected
+    reasons: tuple[str, ...] = ()  # why it fails; empty for a pass
+    seconds: float = 0.0  # that the case took
 
     @property
     def passed(self) -> bool:
