@@ -16,26 +16,16 @@ def nothing(_loop: "BridgedLoop") -> None:
 
 @dataclasses.dataclass(frozen=True)
 class BridgeFault:
-    """A fault that comes while the controller has the valves.
+    """A fault that comes while the controller has the valves."""
 
-    Attributes:
-        name: on the command line.
-        expected: of the loop, in words.
-        put: brings it about.
-        mend: takes it away again; afterwards the operator grants control once more.
-        shown: regular expression of what ``/diagnostics`` say of it.
-        by: the node that says it.
-        within: s until it is said, after it was put.
-        taken_over: whether the plant's own controllers must take over.
-        refused: OPs that the plant may refuse though its mode changed long before.
-    """
-
-    name: str
-    expected: str
-    put: "Callable[[BridgedLoop], None]"
-    shown: str
+    name: str  # on the command line
+    expected: str  # of the loop, in words
+    put: "Callable[[BridgedLoop], None]"  # brings it about
+    shown: str  # regular expression of what ``/diagnostics`` say of it
+    # takes it away again; afterwards the operator grants control once more
     mend: "Callable[[BridgedLoop], None]" = nothing
-    by: str = "opcua"
-    within: float = NOTICED_WITHIN
-    taken_over: bool = True
-    refused: int = 0
+    by: str = "opcua"  # the node that says it
+    within: float = NOTICED_WITHIN  # s until it is said, after it was put
+    taken_over: bool = True  # whether the plant's own controllers must take over
+    refused: int = 0  # OPs that the plant may refuse though its mode changed long before
+    rests: bool = False  # whether the set-points rest, as a valve test wants it

@@ -23,69 +23,40 @@ TAKING_OVER = 4 * WATCHDOG  # s for which it is waited for
 
 @dataclasses.dataclass(frozen=True)
 class Seen:
-    """Everything that is judged of one case.
+    """Everything that is judged of one case."""
 
-    Attributes:
-        begun, mended: wall times of the fault and of its end, s; nan when it was never reached.
-        period: wall time of a sample, s.
-        written: by the plant's own journal.
-        statuses: of all nodes.
-        bag: of the run.
-        logs: of all nodes.
-        ended: exit code of nodes that ended though no fault ended them.
-        limited: OPs before the fault that the bridge had to limit.
-        remarks: what the case itself found wrong.
-    """
-
+    # begun, mended: wall times of the fault and of its end, s; nan when it was never reached
     begun: float
     mended: float
-    period: float
-    written: Written
-    statuses: tuple[Shown, ...]
-    bag: BagFound
-    logs: dict[str, str]
-    ended: dict[str, int]
-    limited: int
-    remarks: tuple[str, ...] = ()
+    period: float  # wall time of a sample, s
+    written: Written  # by the plant's own journal
+    statuses: tuple[Shown, ...]  # of all nodes
+    bag: BagFound  # of the run
+    logs: dict[str, str]  # of all nodes
+    ended: dict[str, int]  # exit code of nodes that ended though no fault ended them
+    limited: int  # OPs before the fault that the bridge had to limit
+    remarks: tuple[str, ...] = ()  # what the case itself found wrong
 
 
 @dataclasses.dataclass(frozen=True)
 class BridgeOutcome:
-    """The verdict of one case.
+    """The verdict of one case."""
 
-    Attributes:
-        fault: its name.
-        ops: that were written.
-        limited: of those before the fault, that limits or rate had changed.
-        ungranted: of these, while no mode granted them.
-        refused: that the plant refused.
-        beyond: furthest that one was beyond limits or rate, %.
-        in_charge: s from the fault until the plant's own controllers had the valves.
-        step: largest step of OP at a transfer of control, %.
-        transfers: of control.
-        noticed: s from the fault until ``/diagnostics`` said so.
-        said: what they said.
-        back: s from the end of the fault until OPs were written again.
-        bag: messages that were heard, and those missing in the bag.
-        reasons: why it fails; empty for a pass.
-        seconds: that the case took.
-    """
-
-    fault: str
-    ops: int
-    limited: int
-    ungranted: int
-    refused: int
-    beyond: float
-    in_charge: float | None
-    step: float
-    transfers: int
-    noticed: float | None
-    said: str
-    back: float | None
-    bag: BagFound
-    reasons: tuple[str, ...] = ()
-    seconds: float = 0.0
+    fault: str  # its name
+    ops: int  # that were written
+    limited: int  # of those before the fault, that limits or rate had changed
+    ungranted: int  # of these, while no mode granted them
+    refused: int  # that the plant refused
+    beyond: float  # furthest that one was beyond limits or rate, %
+    in_charge: float | None  # s from the fault until the plant's own controllers had the valves
+    step: float  # largest step of OP at a transfer of control, %
+    transfers: int  # of control
+    noticed: float | None  # s from the fault until ``/diagnostics`` said so
+    said: str  # what they said
+    back: float | None  # s from the end of the fault until OPs were written again
+    bag: BagFound  # messages that were heard, and those missing in the bag
+    reasons: tuple[str, ...] = ()  # why it fails; empty for a pass
+    seconds: float = 0.0  # that the case took
 
     @property
     def passed(self) -> bool:
@@ -100,7 +71,7 @@ class BridgeOutcome:
 def run_case(fault: BridgeFault, directory: Path, seed: int) -> BridgeOutcome:
     """Run and judge one case below ``directory``, which is empty."""
     started = time.monotonic()
-    loop = BridgedLoop(directory, seed)
+    loop = BridgedLoop(directory, seed, fault.rests)
     mended = math.nan
     try:
         loop.start()
