@@ -18,44 +18,29 @@ UNDER_WAY = 0.5  # s that an OP may be under way when the operator takes control
 
 @dataclasses.dataclass(frozen=True)
 class Allowed:
-    """What remote OPs may do.
+    """What remote OPs may do."""
 
-    Attributes:
-        low, high: limits, %.
-        rate: largest change, % per second of the plant's time.
-        sample_time: s of the plant's time; no change may be larger than that of a sample.
-        speed: seconds of the plant per second.
-    """
-
+    # low, high: limits, %
     low: float
     high: float
-    rate: float
-    sample_time: float
-    speed: float
+    rate: float  # largest change, % per second of the plant's time
+    sample_time: float  # s of the plant's time; no change may be larger than that of a sample
+    speed: float  # seconds of the plant per second
 
 
 @dataclasses.dataclass(frozen=True)
 class Written:
-    """What was written, by the plant's own journal.
+    """What was written, by the plant's own journal."""
 
-    Attributes:
-        taken: remote OPs that were taken.
-        ungranted: of these, those that no mode granted.
-        refused: OPs that the plant refused as no mode granted them, but for those that were
-            under way when it changed.
-        denied: tags that a user had no right to write.
-        beyond: furthest that an OP was beyond limits or rate, %.
-        steps: of OP at each transfer of control, %.
-        modes: every mode with the wall time at which it began, s.
-    """
-
-    taken: int
-    ungranted: int
+    taken: int  # remote OPs that were taken
+    ungranted: int  # of these, those that no mode granted
+    # OPs that the plant refused as no mode granted them, but for those that were under way
+    # when it changed
     refused: int
-    denied: int
-    beyond: float
-    steps: tuple[float, ...]
-    modes: tuple[tuple[str, float], ...]
+    denied: int  # tags that a user had no right to write
+    beyond: float  # furthest that an OP was beyond limits or rate, %
+    steps: tuple[float, ...]  # of OP at each transfer of control, %
+    modes: tuple[tuple[str, float], ...]  # every mode with the wall time at which it began, s
 
 
 def written(events: Iterable[Mapping[str, Any]], allowed: Allowed) -> Written:

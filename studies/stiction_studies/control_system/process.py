@@ -49,27 +49,17 @@ class PlantError(Exception):
 
 @dataclasses.dataclass(frozen=True)
 class PlantOptions:
-    """How the plant runs.
+    """How the plant runs."""
 
-    Attributes:
-        speed: seconds of the plant per second.
-        watchdog: s without a beat after which its PIs take over.
-        rate: of a remote OP, as the tag map says it, % per second of the plant's time.
-        limits: of remote OPs, as the tag map says them, %; None for those of the valves.
-        seed: of the noise.
-        start: the plant's time at the first sample, ns.
-        set_points: schedule file; None for set-points that stay.
-        history: whether values are kept for clients that read history.
-    """
-
-    speed: float = 600.0
-    watchdog: float = 5.0
-    rate: float = 0.25
+    speed: float = 600.0  # seconds of the plant per second
+    watchdog: float = 5.0  # s without a beat after which its PIs take over
+    rate: float = 0.25  # of a remote OP, as the tag map says it, % per second of the plant's time
+    # of remote OPs, as the tag map says them, %; None for those of the valves
     limits: tuple[float, float] | None = None
-    seed: int = 1
-    start: int = 1_700_000_000_000_000_000
-    set_points: str | None = "tank.set_points.yaml"
-    history: bool = False
+    seed: int = 1  # of the noise
+    start: int = 1_700_000_000_000_000_000  # the plant's time at the first sample, ns
+    set_points: str | None = "tank.set_points.yaml"  # schedule file; None for set-points that stay
+    history: bool = False  # whether values are kept for clients that read history
 
 
 class PlantProcess:

@@ -13,21 +13,14 @@ REMOTE_USE, OPERATION, TESTING = "remote", "operation", "testing"  # rights of u
 
 @dataclasses.dataclass(frozen=True)
 class PlantTag:
-    """One tag.
+    """One tag."""
 
-    Attributes:
-        name: and node id in the plant's namespace.
-        kind: of its value, a variant type of OPC UA.
-        initial: value at the start.
-        writers: rights of which a user needs one to write it; none for nobody.
-        history: whether its values may be kept.
-    """
-
-    name: str
-    kind: str
-    initial: Any
+    name: str  # and node id in the plant's namespace
+    kind: str  # of its value, a variant type of OPC UA
+    initial: Any  # value at the start
+    # rights of which a user needs one to write it; none for nobody
     writers: frozenset[str] = frozenset()
-    history: bool = False
+    history: bool = False  # whether its values may be kept
 
 
 class PlantTags:

@@ -15,10 +15,11 @@ class Fault:
 
     name: str  # by which ``stiction faults --only`` knows it
     expected: str  # outcome, one sentence
-    # does it to a running loop and returns when it is over; what it finds wrong by itself it tells
-    # by :meth:`.RunningLoop.remark`
+    # does it to a running loop and returns when it is over; what it finds wrong by itself it
+    # tells by :meth:`.RunningLoop.remark`
     put: Callable[[RunningLoop], None]
-    paces: tuple[Pace, ...] = BOTH_PACES  # paces, phases: in which it means something
+    # paces, phases: in which it means something
+    paces: tuple[Pace, ...] = BOTH_PACES
     phases: tuple[Phase, ...] = BOTH_PHASES
     notices: tuple[Notice, ...] = ()  # diagnostics that must show it
     # paces in which the loop may end with a clear sentence instead of going on
@@ -28,8 +29,8 @@ class Fault:
     silence: float = 1.0
     recovery: float = 5.0  # s from its end until OP must flow again
     bag: Bag = Bag.WHOLE  # what is expected of the bag
-    # whether the controller may take a friction before the swap, so that its moves are those of
-    # afterwards
+    # whether the controller may take a friction before the swap, so that its moves are those
+    # of afterwards
     swaps: bool = False
     forgets: bool = False  # whether the controller may lose what it knew of the friction
     from_start: bool = False  # it is there from the start, and ``put`` has nothing to do

@@ -29,10 +29,11 @@ class Shown:
 
 @dataclasses.dataclass(frozen=True)
 class Known:
-    """What the controller said last of its mode and of the frictions it knows, in %."""
+    """What the controller said last of its mode, since when (ns), and of its frictions, in %."""
 
     mode: str = ""
     friction: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    since: int = dataclasses.field(default=0, compare=False)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,7 +61,8 @@ class Observation:
     phase: Phase  # whether the controller knew the friction
     period: float  # wall time of a sample, s; 0 in lockstep
     step: int  # ns between two samples
-    begun: float  # begun, over, until: wall times: the fault, its end, the end of looking
+    # begun, over, until: wall times: the fault, its end, the end of looking
+    begun: float
     over: float
     until: float
     applied: tuple[Sampled, ...] = ()  # OPs that the plant has applied

@@ -55,7 +55,8 @@ class Memory:
 class Soaked:
     """How a long run went."""
 
-    samples: int  # samples, seconds: how long it was
+    # samples, seconds: how long it was
+    samples: int
     seconds: float
     missed: Mapping[str, int]  # samples that were missed, by node and key
     told: Mapping[str, str]  # what else the nodes have counted, by node and key

@@ -28,3 +28,4 @@ class BridgeFault:
     within: float = NOTICED_WITHIN  # s until it is said, after it was put
     taken_over: bool = True  # whether the plant's own controllers must take over
     refused: int = 0  # OPs that the plant may refuse though its mode changed long before
+    rests: bool = False  # whether the set-points rest, as a valve test wants it

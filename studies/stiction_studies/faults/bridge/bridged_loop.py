@@ -25,7 +25,7 @@ WATCHDOG = 5.0  # s
 RATE = 0.05  # % per s of the plant: 3 % a sample, so that the kicks of embedding meet it
 LIMITS = (35.0, 65.0)  # %
 FRICTION = {"effect": "stiction", "law": "he", "f_s": 8.0, "f_d": 1.0}  # of V1, as it is
-SET_POINTS = {  # a move every two seconds: OP never rests
+SET_POINTS: dict[str, Any] = {  # a move every two seconds: OP never rests
     "repeat": 2400.0,
     "moves": [{"time": 0.0, "C": 7.5, "T": 42.324}, {"time": 1200.0, "C": 7.58, "T": 43.0}],
 }
@@ -35,7 +35,11 @@ HEARD = ("pv", "op", "op_applied")
 SCANS = 3  # of the plant under its own controllers, before control is asked for again
 START = 90.0  # s until the first samples
 SOON = 20.0  # s for what must happen
+REST = 60.0  # s in which PV comes to rest, before the first move of a valve test
 STATUS = "opcua: loop tank"
+LEAST = 0.5  # %: of a move of a valve test
+TEST = "valve_test"  # mode of the controller
+REACH = {"valve_test_op": 20.0, "valve_test_pv": 1.0, "valve_test_output": "C"}
 SECRETS = {  # parameters of the bridge, and its own copies of the files
     "certificate": "client.der",
     "private_key": "client.pem",
@@ -51,14 +55,15 @@ class NotSeenError(Exception):
 class BridgedLoop(FaultedLoop):
     """The loop of one case, as the functions of the catalogue see it."""
 
-    def __init__(self, directory: Path, seed: int) -> None:
+    def __init__(self, directory: Path, seed: int, rests: bool = False) -> None:
         """Make certificates, accounts and parameters, and join the domain."""
         from stiction_studies.faults.loop.fault_probe import Probe
 
         super().__init__(directory)
         self.limited = 0
         schedule = directory / "moves.set_points.yaml"
-        schedule.write_text(yaml.safe_dump(SET_POINTS), encoding="utf-8")
+        moves = {**SET_POINTS, "moves": SET_POINTS["moves"][:1]} if rests else SET_POINTS
+        schedule.write_text(yaml.safe_dump(moves), encoding="utf-8")
         options = PlantOptions(SPEED, WATCHDOG, RATE, LIMITS, seed, set_points=str(schedule))
         self.plant = PlantProcess(directory / "plant", options)
         self.period = self.plant.model.sample_time / SPEED
@@ -104,7 +109,7 @@ class BridgedLoop(FaultedLoop):
         self._must(lambda: len(self.probe.heard["pv"]) >= 10, "ten samples", START)
         self.obtain()
         self._must(lambda: self.taken >= 30, "OPs that are taken")
-        self.limited = int(self.probe.values.get(STATUS, {}).get("op_limited", 0))
+        self.limited = self._limited
 
     def stop(self) -> None:
         """End everything."""
@@ -211,6 +216,11 @@ class BridgedLoop(FaultedLoop):
         return str(modes[-1]["mode"]) if modes else AUTO
 
     @property
+    def _limited(self) -> int:
+        """Number of OPs that limits or rate have changed."""
+        return int(self.probe.values.get(STATUS, {}).get("op_limited", 0))
+
+    @property
     def taken(self) -> int:
         """Number of remote OPs that the plant has taken."""
         return len(self.plant.events("op"))
@@ -232,6 +242,20 @@ class BridgedLoop(FaultedLoop):
             return float(np.abs(away).max()) > 2 * RATE * self.plant.model.sample_time
 
         self._must(far, "a move of OP")
+
+    def test_valve(self) -> None:
+        """Let the controller test a valve, and wait until OP has moved for it."""
+        self.probe.set_parameters("controller", {"mode": TEST, **REACH})
+        self._must(lambda: self.probe.known.mode == TEST, "a valve test")
+        heard, since = self.probe.heard["op"], self.probe.known.since
+
+        def moved() -> bool:
+            ours = [one.values for one in heard if one.stamp >= since]
+            return len(ours) > 1 and abs(ours[-1][0] - ours[0][0]) > LEAST
+
+        self._must(moved, "a move of the test", REST)
+        self._must(lambda: self._limited, "a move at the rate", REST)
+        self.limited = self._limited
 
     # ---- time ------------------------------------------------------------------------------
 

@@ -71,7 +71,7 @@ class BridgeOutcome:
 def run_case(fault: BridgeFault, directory: Path, seed: int) -> BridgeOutcome:
     """Run and judge one case below ``directory``, which is empty."""
     started = time.monotonic()
-    loop = BridgedLoop(directory, seed)
+    loop = BridgedLoop(directory, seed, fault.rests)
     mended = math.nan
     try:
         loop.start()

@@ -82,6 +82,24 @@ def take_back_in_mid_move(loop: BridgedLoop) -> None:
     loop.plant.grant("AUTO")
 
 
+def in_a_valve_test(act: Act) -> Act:
+    """Return what ends a valve test, after which the former mode waits and nothing is written."""
+
+    def put(loop: BridgedLoop) -> None:
+        former = loop.probe.known.mode
+        loop.test_valve()
+        loop.begins()
+        act(loop)
+        if not loop.wait_until(lambda: loop.probe.known.mode == former, LONG):
+            loop.remark(f"the mode is {loop.probe.known.mode}, it was {former} before the test")
+        taken = loop.taken
+        time.sleep(LONG)
+        if loop.taken > taken:
+            loop.remark(f"{loop.taken - taken} OPs were written after the test had ended")
+
+    return put
+
+
 def kill(name: str) -> Act:
     """Return what kills a node."""
 
@@ -236,6 +254,21 @@ FAULTS: tuple[BridgeFault, ...] = (
         "the server does not take an OP in time",
         disturb("DELAY", 0.0),
         refused=1,
+    ),
+    BridgeFault(
+        "valve-test-taken-over",
+        "the operator ends a valve test; the plant's controllers go on from the OP in force",
+        in_a_valve_test(lambda loop: loop.plant.grant("AUTO")),
+        "taken back by the mode|op not written",
+        rests=True,
+    ),
+    BridgeFault(
+        "valve-test-cut-off",
+        "a valve test ends with the connection; nothing more is written",
+        in_a_valve_test(lambda loop: loop.relay.cut()),
+        "the connection was lost",
+        lambda loop: loop.relay.mend(),
+        rests=True,
     ),
 )
 

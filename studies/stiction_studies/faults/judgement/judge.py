@@ -22,7 +22,8 @@ SHARE = 0.1  # by which a known friction may differ after the fault
 class Outcome:
     """The verdict of one case."""
 
-    fault: str  # fault, pace, phase: which
+    # fault, pace, phase: which
+    fault: str
     pace: Pace
     phase: Phase
     beyond: float = math.nan  # largest move of OP beyond what is allowed, %

@@ -128,7 +128,7 @@ class Probe:
             values = {entry.key: entry.value for entry in one.values}
             self.values[one.name] = values
             if task == "mode" and node == self.commander.lstrip("/"):
-                self.known = Known(values.get("mode", ""), _frictions(values))
+                self.known = Known(values.get("mode", ""), _frictions(values), _ns(message))
             level = LEVELS.get(bytes(one.level), "error")
             if task == "status":
                 self.statuses.append(Shown(wall, node, level, one.message))

@@ -27,7 +27,7 @@ class RunningLoop(FaultedLoop):
         from stiction_studies.faults.loop.fault_probe import Probe
 
         super().__init__(directory)
-        self.pace, self.phase = pace, phase
+        self.pace, self.phase, self.seed = pace, phase, seed
         self.model: LoopModel = plant_model()
         self.step = round(self.model.sample_time * 1e9)
         self.period = self.model.sample_time / speed if pace is Pace.REALTIME else 0.0
