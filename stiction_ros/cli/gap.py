@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
         found = find_discrepancy(model, records, settings, progress=show)
     if options.out is not None:  # first: who reads what is printed may stop doing so
         _write(found, Path(options.out))
-    hand_over(options.json, found.to_dict(), lambda: _print(found, options))
+    hand_over(options.json, found.to_dict(), lambda: _print(found, _again(options)))
     return EXIT_CODES[found.verdict]
 
 
@@ -128,7 +128,13 @@ def _write(found: "Discrepancy", directory: Path) -> None:
     print(f"report: {report_gap(found, directory)}", file=sys.stderr)
 
 
-def _print(found: "Discrepancy", options: argparse.Namespace) -> None:
+def _again(options: argparse.Namespace) -> str:
+    """Return the command with what it was given, to which a further record may be added."""
+    given = [*(["--fit-linear"] if options.fit_linear else []), *options.inputs]
+    return shlex.join(["stiction", "gap", *given])
+
+
+def _print(found: "Discrepancy", command: str) -> None:
     from stiction_ros.report.gap_words import called, plain
 
     console = Console()
@@ -169,8 +175,6 @@ def _print(found: "Discrepancy", options: argparse.Namespace) -> None:
     if found.experiment:
         console.print(f"to learn more: {found.experiment}", markup=False)
         if found.alternatives:
-            given = [*(["--fit-linear"] if options.fit_linear else []), *options.inputs]
-            command = shlex.join(["stiction", "gap", *given])
             console.print(f"then with both records: {command} NEXT_RECORD", markup=False)
     if found.untestable:
         listed = ", ".join(called(t.place, t.effect) for t in found.untestable)

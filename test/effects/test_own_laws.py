@@ -231,7 +231,7 @@ def test_gap_names_the_law_in_its_table_and_sentences(
     )
     assert (effect.to_dict()["effect"], effect.to_dict()["law"]) == ("stiction", "xch")
     found = find_discrepancy(loop(), [simulate(loop(), samples=300)], GapOptions(quick=True))
-    _print_gap(dataclasses.replace(found, effects=(effect,)))
+    _print_gap(dataclasses.replace(found, effects=(effect,)), "")
     shown = capsys.readouterr().out
     assert "stiction in valve V1 (law xch)" in shown
 
@@ -245,7 +245,7 @@ def test_the_true_reason_is_told_of_a_law_that_names_no_axes(
     told = {entry.law: entry.reason for entry in found.not_considered}
     assert told["falls_short"] == "it names no axes on which its figures are searched"
     assert told["kano"] == "stiction is searched by the laws he and xch"
-    _print_gap(found)
+    _print_gap(found, "")
     shown = capsys.readouterr().out
     assert f"valve stiction (falls_short): {told['falls_short']}" in shown
     assert f"(semi_physical): {told['kano']}" in shown

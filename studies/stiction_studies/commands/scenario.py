@@ -10,7 +10,6 @@ from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.cli.shared.scenarios import find
-from stiction_studies.commands import unit
 from stiction_studies.seeds import add_jobs, run_seeds, seed_range
 
 if TYPE_CHECKING:
@@ -86,6 +85,8 @@ def run(options: argparse.Namespace) -> int:
 
     scenario = load_scenario(path)
     if not isinstance(scenario, Scenario):
+        from stiction_studies.commands import unit
+
         return unit.run(scenario, options)
     work = functools.partial(run_seed, scenario, ideal_valves=options.ideal_valves)
     outcomes = run_seeds(work, options.seeds, options.jobs, scenario.name)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.online.controller.live import FIRST_MOVE
 from stiction_studies.faults.fault import Fault
 from stiction_studies.faults.kinds.lost_signals import NAN, relayed
 from stiction_studies.faults.kinds.stopped_nodes import NO_PV, kill_and_restart
@@ -95,6 +94,8 @@ def _look(loop: RunningLoop, begun: int, ended: float) -> None:
         return
     in_force = applied[max(stamp for stamp in applied if stamp < back)]
     move = min(float(np.abs(op[back] - one).max()) for one in (start, in_force))
+    from stiction_ros.online.controller.live import FIRST_MOVE  # loads what computes
+
     if move > FIRST_MOVE + ROUNDING:
         loop.remark(f"OP moves {move:.2f} % where the former mode goes on")
 
