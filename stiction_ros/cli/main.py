@@ -56,9 +56,9 @@ GROUPS = {
 }
 """Commands by what they are for; all others are for the makers."""
 COMPILER = "llvmlite"
-"""Package whose functions are not broken off.
+"""Package whose functions are not broken off: machine code calls some of them back.
 
-Those that it calls back from machine code swallow what is raised in them, and keep its lock.
+An exception in such a function is lost, and a lock stays taken.
 """
 
 AGAIN = 0.05  # s, until it is asked again

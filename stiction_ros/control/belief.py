@@ -122,7 +122,7 @@ class ValveBeliefs(Sequence[ValveBelief | None]):
 
     @property
     def sticky(self) -> Iterator[tuple[int, ValveBelief]]:
-        """The valves that are taken to be sticky, with their numbers."""
+        """Number and belief of each valve that is taken to be sticky."""
         return ((j, one) for j, one in enumerate(self._beliefs) if one is not None)
 
     @property

@@ -23,8 +23,8 @@ LONGEST = 30  # samples after which an undecided check is given up
 class Passage:
     """A mean of the latest innovations, which leans while a disturbance is on its way.
 
-    A plan takes the disturbance estimate for constant. While innovations lean it is not: it is on
-    its way to where the disturbance will be, and a stem that jumps after it now jumps again soon.
+    A plan takes the disturbance estimate for constant. While innovations lean, the estimate still
+    moves towards the disturbance. A stem that jumps now has to jump again soon.
     A stem at rest then waits, ``longest`` samples at most.
     """
 

@@ -262,7 +262,7 @@ def lasts(candidate: Candidate, point: FloatArray) -> bool:
 
 
 QUARTER = 0.25
-"""Of a sample: the mean of a stem within a sample may belong to its end or to its middle."""
+"""Of a sample: the mean of the stem over a sample lies between its end and its middle."""
 
 
 def late_axes(asked: bool) -> tuple[Axis, ...]:

@@ -1,4 +1,4 @@
-"""Candidates in the process, between its valves and its sensors, and rivals of no name."""
+"""Candidates between the valves and the sensors, and rivals outside the catalogue."""
 
 import dataclasses
 import math
@@ -160,7 +160,7 @@ def output_candidates(run: FreeRun) -> list[Candidate]:
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class _Decoy(OutputCandidate):
-    """A rival outside the catalogue: it shows that something is amiss which that does not name."""
+    """A rival outside the catalogue: where it wins, the catalogue does not name what is wrong."""
 
     inside: bool = False
 

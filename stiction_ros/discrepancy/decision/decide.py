@@ -1,4 +1,4 @@
-"""Steps 5 and 6: what the scores allow to say, and what recorded stems say against it."""
+"""Steps 5 and 6: the verdict by the scores, and the veto of a recorded stem."""
 
 import dataclasses
 import enum

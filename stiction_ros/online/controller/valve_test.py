@@ -77,9 +77,10 @@ class ValveTest:
             self._met = f"PV {pv:.4g} goes beyond {low:.4g} to {high:.4g}"
             self._pv.append(pv)
             self._op.append(self._level)
-        if not self.over and self._met and self._judged():
-            self.stop(f"{self._met}. {self._told}".strip())
-        elif not self.over and not self._met and self._left <= 0:
+        if not self.over and self._met:
+            if self._judged():
+                self.stop(f"{self._met}. {self._told}".strip())
+        elif not self.over and self._left <= 0:
             self._go_on()
         if self.over or self._met:
             return self.facts.op

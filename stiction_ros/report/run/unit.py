@@ -105,7 +105,7 @@ def unit_page(report: UnitReport) -> str:
         *[f'<p class="lead">{words(line)}</p>' for line in said],
         table(UNIT_COLUMNS, unit_rows(report), texts=4),
         '<p class="soft">Verdict, cause and period: of what was recorded before the first swap. '
-        "Amplitude: of PV − SP at this period, in a round before and one after it.</p>",
+        "Amplitude: of PV − SP at this period, over pieces of a round before and one after.</p>",
     ]
     for name, story in report.stories.items():
         parts += [
