@@ -41,6 +41,7 @@ class ManualTest:
         time: dead time and lag, s; of a level, the time in which its loop would be closed.
         lead: of OP over the stem at the start, %.
         noise: standard deviation of the transmitter's noise, engineering units.
+        colour: time constant of the noise, samples; 0 is white.
         step: of the rounding of PV, same units; 0 is none.
         stale: first sample, and the one behind the last, in which PV shows no news.
         circumstances: names of what is not usual.
@@ -53,6 +54,7 @@ class ManualTest:
     time: float
     lead: float
     noise: float
+    colour: float
     step: float
     stale: tuple[tuple[int, int], ...]
     circumstances: tuple[str, ...]
@@ -88,6 +90,13 @@ class ManualTest:
     def op(self) -> float:
         """OP at the start, %."""
         return self.loop.process.stem + self.lead
+
+    def noise_over(self, samples: int) -> float:
+        """Return the standard deviation of the mean of the noise over some samples."""
+        kept = math.exp(-1.0 / self.colour) if self.colour else 0.0
+        apart = np.arange(1, samples)
+        shared = 1.0 + 2.0 * float(((1.0 - apart / samples) * kept**apart).sum())
+        return self.noise * math.sqrt(shared / samples)
 
     def pv(self, op: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return PV as it is recorded, and without noise, for OP at the samples, (N,) each."""
@@ -148,6 +157,7 @@ def manual_test(seed: int) -> ManualTest:
         time=lag + delay,
         lead=random.uniform(-0.9, 0.9) * valve.static,
         noise=noise,
+        colour=colour,
         step=noise * log_uniform(random, 0.5, 3.0) if coarse else 0.0,
         stale=_stretches(random) if stale else (),
         circumstances=tuple(

@@ -96,7 +96,7 @@ def facts_of(case: ManualTest) -> Facts:
         op=case.op,
         pv=middle,
         gain=each * off[2],
-        noise=case.noise / np.sqrt(samples),
+        noise=case.noise_over(samples),
         dead=case.answer.dead_time * off[1],
         hold=samples * step,
         op_limit=REACH,
