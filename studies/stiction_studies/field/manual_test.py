@@ -91,13 +91,6 @@ class ManualTest:
         """OP at the start, %."""
         return self.loop.process.stem + self.lead
 
-    def noise_over(self, samples: int) -> float:
-        """Return the standard deviation of the mean of the noise over some samples."""
-        kept = math.exp(-1.0 / self.colour) if self.colour else 0.0
-        apart = np.arange(1, samples)
-        shared = 1.0 + 2.0 * float(((1.0 - apart / samples) * kept**apart).sum())
-        return self.noise * math.sqrt(shared / samples)
-
     def pv(self, op: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return PV as it is recorded, and without noise, for OP at the samples, (N,) each."""
         steps = self.loop.clock.sample
