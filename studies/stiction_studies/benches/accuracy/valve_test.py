@@ -107,7 +107,7 @@ def facts_of(case: ManualTest) -> Facts:
 
 
 def judge(seed: int) -> Ended:
-    """Test the valve of a seed as a running loop does, three rounds at most.
+    """Test the valve of a seed as a running loop does.
 
     PV counts until the dead time after the last move is over: what is under way comes.
     """
