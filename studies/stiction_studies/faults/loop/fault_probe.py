@@ -227,9 +227,8 @@ class Probe:
     def set_parameters(self, node: str, values: Mapping[str, Any]) -> list[bool]:
         """Set parameters of ``node``; return which were taken, empty when it did not answer."""
         request = SetParameters.Request()
-        request.parameters = [
-            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
-        ]
+        wanted = (Parameter(name, value=value) for name, value in values.items())
+        request.parameters = [one.to_parameter_msg() for one in wanted]
         answer = self._call(SetParameters, f"{node}/set_parameters", request)
         return [] if answer is None else [bool(one.successful) for one in answer.results]
 
