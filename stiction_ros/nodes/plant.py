@@ -85,10 +85,11 @@ class PlantNode(ManagedNode):
         """Create the topics of one loop, in the namespace of its name."""
         space = f"{loop.name}/" if loop.name else ""  # of one loop alone: that of the plant
         controller, estimator = f"{space}controller", f"{space}estimator"
+        commander = self.commander(loop.name) if self.settings.commander else ""
         op = self.wiring.op_of(loop)
         joined = JoinedLoop(
             loop,
-            op_port=OpPort(self.commander(loop.name), self._step, exact=not self._realtime),
+            op_port=OpPort(commander, self._step, exact=not self._realtime),
             op=op,
             # What was in force before the run: a reader knows the OP of its first sample.
             applied=joint_state(self._start - self._step, loop.valves, op),

@@ -284,12 +284,9 @@ class ManagedNode(LifecycleNode):
         return value
 
     def commander(self, space: str = "") -> str:
-        """Return the full name of the node that commands a loop in the namespace ``space``.
-
-        It is empty for the first that commands.
-        """
+        """Return the full name of the node that commands a loop in the namespace ``space``."""
         name = str(self.settings.commander)
-        if not name or name.startswith("/"):
+        if name.startswith("/"):
             return name
         parts = (self.get_namespace().strip("/"), space, name)
         return "/" + "/".join(part for part in parts if part)
