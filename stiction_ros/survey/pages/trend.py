@@ -3,12 +3,9 @@
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 
-from stiction_ros.pages.frame import text
 from stiction_ros.pages.plot import spark
 from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.pages.words import figure, op_figure
-
-PLACE = "<!-- trend --><!-- /trend -->"  # for what no worker knows
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,17 +73,3 @@ def new_and_gone(
         return [], []
     now, before = {entry.name for entry in entries}, set(earlier[-1].bands)
     return sorted(now - before), sorted(before - now)
-
-
-def with_trend(page: str, trend: Trend, most: float) -> str:
-    """Return a page with a trend in it, up to ``most``, whether there was one or not."""
-    begin, end = PLACE.split("><")
-    begin, end = f"{begin}>", f"<{end}"
-    before, found, rest = page.partition(begin)
-    if not found:
-        return page
-    shown = (
-        f"<h2>Earlier surveys</h2><p>Band f_S + f_D: {text(trend.words)} {trend.line(most)} "
-        f'<span class="soft">{text(trend.told)}</span></p>'
-    )
-    return f"{before}{begin}{shown}{end}{rest.partition(end)[2]}"
