@@ -29,7 +29,7 @@ from stiction_ros.texts import probability
 
 if TYPE_CHECKING:
     from stiction_ros.survey.entry import Entry
-    from stiction_ros.survey.pages.trend import Earlier
+    from stiction_ros.survey.listing.headline import Earlier
     from stiction_ros.survey.survey import Survey
 
 LOCAL = "local"  # the engine of this machine
@@ -164,8 +164,6 @@ def run(options: argparse.Namespace) -> int:
         if not path.exists():
             raise InputError("there is no such file or folder", where=str(path))
     reading = intake.intake_options(options)
-    if options.dry_run:
-        return intake.show_loops(paths, reading)
     costs = _costs(options.cost)
     units = {name: unit for _, name, unit in _pairs(options.units)}
     identification = IdentificationOptions(law=options.law)
@@ -275,7 +273,7 @@ def _costs(file: str | None) -> dict[str, float]:
 
 def _earlier(files: Sequence[str]) -> list[Any]:
     """Return earlier surveys, in the order of the files."""
-    from stiction_ros.survey.pages.trend import Earlier
+    from stiction_ros.survey.listing.headline import Earlier
 
     found = []
     for file in files:

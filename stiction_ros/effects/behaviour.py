@@ -4,7 +4,7 @@ import dataclasses
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -266,16 +266,25 @@ class Filter:
     d: float  # direct gain
 
 
-@runtime_checkable
-class DrivenByNoise(Protocol):
-    """A behaviour that is random: whoever simulates it draws its numbers.
+@dataclasses.dataclass(frozen=True)
+class DrivenByNoise(Behaviour):
+    """A random wave w: whoever simulates it draws its numbers.
 
     A plant takes :meth:`step_with` in the place of ``step`` and draws from its own seed, the same
-    numbers in every run of that seed. ``step`` still says what it does where nothing is drawn.
+    numbers in every run of that seed. ``step`` says what it does where nothing is drawn: of a wave
+    at rest nothing is expected. The memory is (w, time of the last sample).
     """
 
+    places: ClassVar[tuple[str, ...]] = ("load", "disturbance")
+
+    def rest(self, value: float) -> Memory:
+        return (0.0, NO_SAMPLE)
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        return self.step_with(memory, value, time, 0.0)
+
+    @abstractmethod
     def step_with(
         self, memory: Memory, value: float, time: float, normal: float
     ) -> tuple[Memory, float]:
         """Advance one sample with ``normal`` drawn from N(0, 1)."""
-        ...

@@ -8,10 +8,9 @@ from made import GAIN, entry, identification, record
 
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.groups import Group
-from stiction_ros.survey.listing.headline import in_words
+from stiction_ros.survey.listing.headline import Earlier, in_words
 from stiction_ros.survey.listing.page import list_page
 from stiction_ros.survey.pages.loop_page import loop_page
-from stiction_ros.survey.pages.trend import Earlier
 from stiction_ros.survey.pages.words import in_op_unit, period
 from stiction_ros.survey.survey import Survey
 
