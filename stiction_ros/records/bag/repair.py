@@ -4,12 +4,11 @@ import dataclasses
 import enum
 import shlex
 import shutil
-from collections import Counter
 from pathlib import Path
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag import finish
-from stiction_ros.records.storage.bag_metadata import BagFile
+from stiction_ros.records.storage.bag_metadata import BagFile, joined
 from stiction_ros.records.storage.files import METADATA, found_files, listing_notes, refuse_foreign
 from stiction_ros.records.storage.mcap_scan import McapScan
 from stiction_ros.records.storage.packed import SUFFIXES
@@ -70,20 +69,17 @@ def repair_bag(path: str | Path) -> Repair:
     status = RepairStatus.FINISHED if any(ill) or listing else RepairStatus.WHOLE
     if any(scan.damaged for scan in scans):
         status = RepairStatus.SALVAGED
-    return Repair(
-        status, tuple(file.name for file in files), dict(_counts(contents)), (*notes, *listing)
-    )
+    whole = joined([content.file for content in contents])
+    names = tuple(file.name for file in files)
+    return Repair(status, names, dict(whole.counts), (*notes, *listing))
 
 
 def _look(path: Path) -> finish.FileContent:
     """Return what a file holds, damaged or not."""
     scan = McapScan(path, salvage=True)
     times = [message.log_time for message in scan.messages()]
-    counts: Counter[str] = Counter()
-    for channel, topic in scan.topics.items():
-        counts[topic.name] += scan.counts[channel]
     first, last = min(times, default=None), max(times, default=None)
-    return finish.FileContent(BagFile(path.name, dict(counts), first, last), scan)
+    return finish.FileContent(BagFile(path.name, scan.counts, first, last), scan)
 
 
 def _listing_faults(path: Path, contents: list[finish.FileContent]) -> list[str]:
@@ -93,13 +89,6 @@ def _listing_faults(path: Path, contents: list[finish.FileContent]) -> list[str]
     if not (path / METADATA).is_file():
         return [f"{METADATA} is missing"]
     try:
-        return listing_notes(path, _counts(contents))
+        return listing_notes(path, joined([content.file for content in contents]).counts)
     except InputError as error:
         return [str(error)]
-
-
-def _counts(contents: list[finish.FileContent]) -> Counter[str]:
-    counts: Counter[str] = Counter()
-    for content in contents:
-        counts.update(content.file.counts)
-    return counts
