@@ -8,9 +8,8 @@ import numpy as np
 
 from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapVerdict, Look
 from stiction_ros.discrepancy.gap.measure import levelled
-from stiction_ros.effects import FloatArray
 from stiction_ros.pages.frame import framed, text
-from stiction_ros.pages.plot import SCRIPT, Curve, against, over_time
+from stiction_ros.pages.plot import SCRIPT, Curve, over_time
 from stiction_ros.report import gap_words as say
 from stiction_ros.report.page import Cell, card, folded, number, table, write_page
 from stiction_ros.signals.holds import stretches
@@ -224,28 +223,12 @@ def _tracks(found: Discrepancy, look: Look) -> str:
         return ""
     track = look.where.tracks[0]
     place, curve = say.plain(track.place), Curve("disturbance", "free", track.wave)
-    driver, label = _driver(found, look, track.place)
     time = np.arange(float(len(found.runs))) * found.runs.sample_time
     return over_time(
         f"The slow disturbance at {place} that would close the gap. A step or a ramp in it is a "
         "disturbance.",
         *(time, [curve], f"missing at {text(place)}"),
-    ) + against(
-        f"The same against {label}. A loop is play or friction, a bend is a characteristic or a "
-        "limit.",
-        [(driver, curve)],
-        (text(label), f"missing at {text(place)}"),
-        equal=False,
     )
-
-
-def _driver(found: Discrepancy, look: Look, place: str) -> tuple[FloatArray, str]:
-    kind, _, tag = place.partition(":")
-    names = found.model_before.valve_names
-    if kind == "valve":
-        return found.runs.op[:, names.index(tag)], f"OP of {tag} (%)"
-    i = found.model_before.outputs.index(tag)
-    return look.scores.base.run.forced[:, i], f"free run of {tag}"
 
 
 def effect_card(effect: FoundEffect) -> str:

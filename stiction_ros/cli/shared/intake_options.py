@@ -5,7 +5,6 @@ import csv
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake import CsvColumns, IntakeOptions, Loop, loops, one_loop
@@ -103,13 +102,8 @@ def add_intake(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
 
 def columns(options: argparse.Namespace) -> CsvColumns:
     """Return the chosen columns."""
-    chosen: dict[str, Any] = {}
-    for key in ("op", "pv", "sp", "stem"):
-        if getattr(options, key, None):
-            chosen[key] = dict(getattr(options, key))
-    if getattr(options, "time", None) is not None:
-        chosen["time"] = options.time
-    return CsvColumns(**chosen)
+    op, pv, sp, stem = (dict(getattr(options, key)) or None for key in ("op", "pv", "sp", "stem"))
+    return CsvColumns(op, pv, sp, stem, options.time)
 
 
 def intake_options(options: argparse.Namespace) -> IntakeOptions:
@@ -119,7 +113,7 @@ def intake_options(options: argparse.Namespace) -> IntakeOptions:
         raise InputError(f"{step:g} s is no sample time", where="--sample-time")
     return IntakeOptions(
         columns=columns(options),
-        namespace=getattr(options, "namespace", None),
+        namespace=options.namespace,
         tags=None if options.tags is None else Path(options.tags),
         strict=options.strict,
         op_unit=None if options.op_unit is None else OpUnit(options.op_unit),
