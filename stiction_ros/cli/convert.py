@@ -20,10 +20,8 @@ def add(commands: Any) -> None:
         "a sample each; a record with gaps, or of several runs, becomes OUT_1, OUT_2 and so on. "
         "What was done is told.",
     )
-    parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
+    intake.add_record(parser)
     parser.add_argument("out", metavar="OUT", help="F.csv, or the directory of a new bag")
-    intake.add_columns(parser)
-    intake.add_intake(parser)
     parser.add_argument(
         "--iso", action="store_true", help="write times of a CSV file in ISO 8601 (UTC)"
     )
@@ -36,8 +34,6 @@ def run(options: argparse.Namespace) -> int:
     to_csv = out.suffix.lower() == ".csv"
     if options.iso and not to_csv:
         raise InputError("is for CSV files", where="--iso", fix="let OUT end in .csv")
-    if options.dry_run:
-        return intake.show_loops([Path(options.record)], intake.intake_options(options))
     records = intake.opened(options).parts
     for number, record in enumerate(records, start=1):
         target = out if len(records) == 1 else out.with_name(f"{out.stem}_{number}{out.suffix}")

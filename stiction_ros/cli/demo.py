@@ -1,7 +1,6 @@
 """``stiction demo``: a live loop from limit cycle to compensation, recorded and reported."""
 
 import argparse
-import os
 import shutil
 import signal
 import sys
@@ -100,7 +99,7 @@ def _run_scenario(
     name = scenario.name
     nodes = loop_nodes(scenario.path, directory, seed=options.seed, speed=options.speed)
     processes = NodeProcesses(nodes, directory)
-    load, begin = os.getloadavg()[0], time.monotonic()
+    begin = time.monotonic()
     try:
         try:
             processes.start()
@@ -115,7 +114,7 @@ def _run_scenario(
     show(0.92, f"{name}: reporting")
     if not isinstance(scenario, Scenario):
         return _report_unit(scenario, directory, seconds)
-    report = report_run(directory / "bag", directory, scenario=scenario, seconds=seconds, load=load)
+    report = report_run(directory / "bag", directory, scenario=scenario, seconds=seconds)
     show(1.0)
     _print(report.summary, directory)
     return bool(report.summary["status"] == "ok")
@@ -170,8 +169,7 @@ def _print(summary: dict[str, Any], directory: Path) -> None:
     console.print(table)
     if summary["pv_to_op_ms"]:
         times = ", ".join(f"{key} {value:.3g}" for key, value in summary["pv_to_op_ms"].items())
-        load = f"load {summary['load_before']:.2f} before the run"
-        console.print(f"{name}: PV to OP in ms: {times}; {load}")
+        console.print(f"{name}: PV to OP in ms: {times}")
     for topic, count in summary["messages"].items():
         lost = (count["published"] or 0) - count["recorded"]
         if lost > 0:

@@ -6,17 +6,15 @@ import sys
 from typing import Any
 
 from stiction_ros.cli import extensions
-from stiction_ros.cli.fit_linear import limits_range
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, prbs_experiment
-from stiction_ros.loop.excitation import LEVELS, SWITCH_PROBABILITY
 from stiction_ros.records.csv_writer import write_csv
 
 DEFAULT_MODEL = "tank.loop.yaml"
 PRBS = (
-    "prbs: simulate an open-loop experiment on a loop model, in which every valve moves by a "
-    "random binary sequence of its own, as in Appendix A, and write its record."
+    "prbs: simulate an open-loop experiment on a loop model, in which every valve, without its "
+    "effects, moves by a random binary sequence of its own, as in Appendix A, and write its record."
 )
 
 
@@ -31,25 +29,6 @@ def add(commands: Any) -> None:
     option("--model", default=DEFAULT_MODEL, metavar="F", help=f"loop model ({DEFAULT_MODEL})")
     option("--seed", type=int, default=1, metavar="N", help="seed of moves and noise (1)")
     option("--samples", type=int, default=3000, metavar="N", help="number of samples (3000)")
-    option(
-        "--switch-probability",
-        type=float,
-        default=SWITCH_PROBABILITY,
-        metavar="P",
-        help="probability that a valve moves at a sample (0.05)",
-    )
-    option(
-        "--levels",
-        type=limits_range,
-        default=LEVELS,
-        metavar="LO:HI",
-        help="the two levels of OP, %% (40:60)",
-    )
-    option(
-        "--keep-effects",
-        action="store_true",
-        help="keep the effects of the valves of the model (default: ideal valves)",
-    )
     option("--out", required=True, metavar="F", help="file or folder to write")
     if plant is not None:
         plant.add_options(parser)
@@ -66,12 +45,8 @@ def run(options: argparse.Namespace) -> int:
         return int(extensions.needed_part("experiment plant").run_plant(options))
     if options.samples < 2:
         raise InputError(f"{options.samples} is too few", where="--samples", fix="use 2 or more")
-    model = LoopModel.load(find_config(options.model))
-    if not options.keep_effects:
-        model = model.with_ideal_valves()
-    record = prbs_experiment(
-        model, options.samples, options.seed, options.switch_probability, options.levels
-    )
+    model = LoopModel.load(find_config(options.model)).with_ideal_valves()
+    record = prbs_experiment(model, options.samples, options.seed)
     write_csv(record, options.out)
     command = shlex.join(["stiction", "fit-linear", options.out])
     print(f"{options.out}: {len(record)} samples; read it by\n{command}", file=sys.stderr)

@@ -27,9 +27,7 @@ def add(commands: Any) -> None:
         description="Fit a linear model from OP to PV and write it as a loop model. Exit code 1 "
         "when there is no stable model.",
     )
-    parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
-    intake.add_columns(parser)
-    intake.add_intake(parser)
+    intake.add_record(parser)
     parser.add_argument(
         "--kind",
         default="state_space",
@@ -65,8 +63,6 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    if options.dry_run:
-        return intake.show_loops([Path(options.record)], intake.intake_options(options))
     loop = intake.opened(options)
     record = longest_part(loop.parts)
     from stiction_ros.identification.linear.data import LinearKind, LinearStatus, OrderCriterion

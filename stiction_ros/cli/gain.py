@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -23,8 +22,6 @@ if TYPE_CHECKING:
     from stiction_ros.identification import Identification
     from stiction_ros.records.record import Record
 
-MODEL_ENDING = ".loop.yaml"
-
 MEASURES = {
     "amplitude": "amplitude",
     "iae_per_hour": "mean |PV−SP|",
@@ -44,11 +41,8 @@ def add(commands: Any) -> None:
         "the friction, another tuning, or nothing. A record is identified first and the "
         "controller of the record is the baseline; a model needs a controller of its own.",
     )
-    parser.add_argument(
-        "record", metavar="RECORD|MODEL", help=f"CSV file, other export, bag, or *{MODEL_ENDING}"
-    )
-    intake.add_columns(parser)
-    intake.add_intake(parser)
+    text = "CSV file, other export, bag, or *.loop.yaml"
+    intake.add_record(parser, text, "RECORD|MODEL")
     add_law(parser)
     parser.add_argument(
         "--valve",
@@ -68,8 +62,6 @@ def run(options: argparse.Namespace) -> int:
     # Simulating takes compiled code, which other commands do not wait for.
     from stiction_ros.gain.gain import Gain
 
-    if options.dry_run:
-        return intake.show_loops([Path(options.record)], intake.intake_options(options))
     found: Gain
     verdict: dict[str, Any] = {}
     if intake.is_model(options.record):

@@ -71,9 +71,6 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    if options.dry_run:
-        records = options.inputs if options.fit_linear else options.inputs[1:]
-        return intake.show_loops([Path(path) for path in records], intake.intake_options(options))
     model, records = _inputs(options)
     from stiction_ros.discrepancy import GapOptions, find_discrepancy
 

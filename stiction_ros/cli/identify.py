@@ -33,9 +33,7 @@ def add(commands: Any) -> None:
         "or of several runs the longest good part is taken.",
     )
     option = parser.add_argument
-    option("record", metavar="RECORD", help="CSV file, other export, or bag")
-    intake.add_columns(parser)
-    intake.add_intake(parser)
+    intake.add_record(parser)
     option(
         "--na",
         type=searches.output_orders,
@@ -88,8 +86,6 @@ def delay_range(text: str) -> tuple[int, int]:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    if options.dry_run:
-        return intake.show_loops([Path(options.record)], intake.intake_options(options))
     loop = intake.opened(options)
     record, parts = longest_part(loop.parts), loop.parts
     chosen = searches.search_options(options)

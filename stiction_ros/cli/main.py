@@ -123,18 +123,6 @@ class _Parser(argparse.ArgumentParser):
             self.error(self._unknown(spare))
         return found, spare
 
-    def _get_value(self, action: argparse.Action, arg_string: str) -> Any:
-        try:
-            return super()._get_value(action, arg_string)
-        except argparse.ArgumentError as error:
-            raise _with_meant(error, action, arg_string) from None
-
-    def _check_value(self, action: argparse.Action, value: Any) -> None:
-        try:
-            super()._check_value(action, value)
-        except argparse.ArgumentError as error:
-            raise _with_meant(error, action, value) from None
-
     def _unknown(self, spare: Sequence[str]) -> str:
         words = [word.partition("=")[0] for word in spare if word.startswith("-")]
         if words:
@@ -161,14 +149,6 @@ class _Top(_Parser):
             lines += ["", title, *(f"  {name:13}  {self.texts[name]}" for name in names)]
         lines += ["", "stiction COMMAND --help lists the options of a command.", ""]
         return "\n".join(lines)
-
-
-def _with_meant(
-    error: argparse.ArgumentError, action: argparse.Action, word: object
-) -> argparse.ArgumentError:
-    """Return the error of a choice that there is not, with the one that may be meant."""
-    near = _meant(str(word), map(str, action.choices or ()))
-    return argparse.ArgumentError(action, f"{error.message}{near}")
 
 
 def _meant(word: str, known: Iterable[str]) -> str:
@@ -219,8 +199,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 extensions.refuse(command)
             parser("").error(f"there is no command {command}{_meant(command, known)}")
         options = parser(command).parse_args(given, argparse.Namespace(words=given))
+        run = options.run
+        if getattr(options, "dry_run", False):
+            from stiction_ros.cli.shared.intake_options import dry_run as run
         with waiting_for_compiler():
-            return int(options.run(options))
+            return int(run(options))
     except InputError as error:
         print(f"stiction: {error}", file=sys.stderr)
         return USAGE

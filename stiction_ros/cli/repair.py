@@ -6,7 +6,6 @@ from typing import Any
 
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.finish import COMPRESSIONS, Packing
 from stiction_ros.records.bag.repair import Repair, RepairStatus, repair_bag
 
 _SAID = {
@@ -25,12 +24,6 @@ def add(commands: Any) -> None:
         "metadata.yaml anew. A whole bag is left as it is.",
     )
     parser.add_argument("bag", metavar="BAG", help="rosbag2 directory or .mcap file")
-    parser.add_argument(
-        "--compression",
-        default="zstd",
-        choices=COMPRESSIONS,
-        help="compression of files that are rewritten (default: zstd)",
-    )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.set_defaults(run=run)
 
@@ -38,7 +31,7 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     try:
-        done = repair_bag(options.bag, Packing(options.compression))
+        done = repair_bag(options.bag)
     except OSError as error:
         raise InputError(
             f"cannot be rewritten ({error.strerror or error})", where=str(error.filename)

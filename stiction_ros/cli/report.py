@@ -15,9 +15,7 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "report", description="Make a self-contained HTML report of a bag, or of a CSV record."
     )
-    parser.add_argument("record", metavar="BAG_OR_RECORD", help="bag or CSV file")
-    intake.add_columns(parser)
-    intake.add_intake(parser)
+    intake.add_record(parser, metavar="BAG_OR_RECORD")
     parser.add_argument(
         "--out",
         default="report.html",
@@ -39,8 +37,6 @@ def holds_live_run(path: str) -> bool:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     out = Path(options.out)
-    if options.dry_run:
-        return intake.show_loops([Path(options.record)], intake.intake_options(options))
     with storing(out, fix="choose another --out"):
         if is_bag(options.record) and holds_live_run(options.record):
             from stiction_ros.report.run.report import report_run

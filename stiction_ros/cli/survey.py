@@ -4,6 +4,7 @@ import argparse
 import csv
 import dataclasses
 import datetime
+import importlib.util
 import json
 import os
 import sys
@@ -28,7 +29,7 @@ from stiction_ros.texts import probability
 
 if TYPE_CHECKING:
     from stiction_ros.survey.entry import Entry
-    from stiction_ros.survey.pages.trend import Earlier
+    from stiction_ros.survey.listing.headline import Earlier
     from stiction_ros.survey.survey import Survey
 
 LOCAL = "local"  # the engine of this machine
@@ -163,8 +164,6 @@ def run(options: argparse.Namespace) -> int:
         if not path.exists():
             raise InputError("there is no such file or folder", where=str(path))
     reading = intake.intake_options(options)
-    if options.dry_run:
-        return intake.show_loops(paths, reading)
     costs = _costs(options.cost)
     units = {name: unit for _, name, unit in _pairs(options.units)}
     identification = IdentificationOptions(law=options.law)
@@ -233,24 +232,14 @@ def _engine(options: argparse.Namespace) -> Any:
 
 
 def _write(found: Any, out: Path, earlier: Sequence[Any]) -> None:
-    from stiction_ros.survey.listing.columns import Columns
     from stiction_ros.survey.listing.page import list_page
     from stiction_ros.survey.listing.tables import write_csv, write_xlsx
-    from stiction_ros.survey.pages.trend import with_trend
 
     with storing(out):
         (out / PAGE).write_text(list_page(found, earlier), encoding="utf-8")
         write_csv(out / CSV, found.entries)
-        write_xlsx(out / XLSX, found.entries)
-        columns = Columns.of(found.entries, earlier)
-        for entry in found.entries:
-            trend = columns.trends.get(entry.name)
-            if entry.report is not None and trend is not None:
-                page = out / entry.report
-                told = with_trend(
-                    page.read_text(encoding="utf-8"), trend, columns.widest[entry.op_unit]
-                )
-                page.write_text(told, encoding="utf-8")
+        if importlib.util.find_spec("openpyxl") is not None:
+            write_xlsx(out / XLSX, found.entries)
 
 
 def _pairs(file: str | None) -> list[tuple[int, str, str]]:
@@ -284,7 +273,7 @@ def _costs(file: str | None) -> dict[str, float]:
 
 def _earlier(files: Sequence[str]) -> list[Any]:
     """Return earlier surveys, in the order of the files."""
-    from stiction_ros.survey.pages.trend import Earlier
+    from stiction_ros.survey.listing.headline import Earlier
 
     found = []
     for file in files:

@@ -1,4 +1,4 @@
-"""How far a survey is and how long the rest takes: loops that are done, of all that there are."""
+"""How far a survey is: loops that are done, of all that there are."""
 
 import contextlib
 import sys
@@ -45,30 +45,6 @@ class Counted:
         self._thread.join(ENDS_WITHIN)
 
 
-class Forecast:
-    """Tells how far a survey is; the rest takes as long for each loop as those of this run."""
-
-    def __init__(
-        self, show: Callable[[float, str], None], total: Callable[[], int | None], clock: Clock
-    ) -> None:
-        """Begin now; ``show`` is given the share done, where the total is known, and words."""
-        self._show, self._total, self._clock = show, total, clock
-        self._begun = clock()
-
-    def __call__(self, reached: "Reached") -> None:
-        """Tell of a loop that is done."""
-        total, here = self._total(), reached.done - reached.before
-        if total is None:
-            self._show(0.0, f"{reached.done} loops: {reached.entry.name}")
-            return
-        total = max(total, reached.drawn)
-        words = f"{reached.done} of {total} loops"
-        if here and reached.done < total:
-            left = (self._clock() - self._begun) / here * (total - reached.done)
-            words += f", about {_duration(left)} left"
-        self._show(reached.done / total, f"{words}: {reached.entry.name}")
-
-
 class Lines:
     """Prints a line now and then, where a bar would fill a file."""
 
@@ -86,24 +62,25 @@ class Lines:
 
 
 @contextlib.contextmanager
-def progress(found: Iterable[object] | None) -> Iterator[Forecast]:
+def progress(found: Iterable[object] | None) -> Iterator[Callable[["Reached"], None]]:
     """Show how far a survey is: a bar on a terminal, lines elsewhere.
 
     The loops are found once more, to be counted; None where reading them twice costs too much.
     """
     counted = None if found is None else Counted(found)
+
+    def tell(reached: "Reached") -> None:
+        total = None if counted is None else counted.total
+        if total is None:
+            shown(0.0, f"{reached.done} loops: {reached.entry.name}")
+            return
+        total = max(total, reached.drawn)
+        shown(reached.done / total, f"{reached.done} of {total} loops: {reached.entry.name}")
+
     try:
         with bar("survey") as show:
             shown = show if sys.stderr.isatty() else Lines(time.monotonic)
-            yield Forecast(
-                shown, lambda: None if counted is None else counted.total, time.monotonic
-            )
+            yield tell
     finally:
         if counted is not None:
             counted.end()
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 90.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"

@@ -12,111 +12,61 @@ Examples:
 from collections.abc import Mapping
 from typing import Any
 
-from stiction_ros.effects.behaviour import (
-    Behaviour,
-    DrivenByNoise,
-    Filter,
-    Memory,
-    Parameter,
-    parameter,
+from stiction_ros.effects.behaviour import Behaviour as Behaviour
+from stiction_ros.effects.behaviour import DrivenByNoise as DrivenByNoise
+from stiction_ros.effects.behaviour import Filter as Filter
+from stiction_ros.effects.behaviour import Memory as Memory
+from stiction_ros.effects.behaviour import Parameter as Parameter
+from stiction_ros.effects.behaviour import parameter as parameter
+from stiction_ros.effects.data.time_shift import TimeShift as TimeShift
+from stiction_ros.effects.data.tuning import Tuning as Tuning
+from stiction_ros.effects.discovery import behaviours as behaviours
+from stiction_ros.effects.discovery import register as register
+from stiction_ros.effects.disturbance.coloured import ColouredDisturbance as ColouredDisturbance
+from stiction_ros.effects.disturbance.drift import DriftDisturbance as DriftDisturbance
+from stiction_ros.effects.disturbance.random_walk import (
+    RandomWalkDisturbance as RandomWalkDisturbance,
 )
-from stiction_ros.effects.data.time_shift import TimeShift
-from stiction_ros.effects.data.tuning import Tuning
-from stiction_ros.effects.discovery import behaviours, register
-from stiction_ros.effects.disturbance.coloured import ColouredDisturbance
-from stiction_ros.effects.disturbance.drift import DriftDisturbance
-from stiction_ros.effects.disturbance.random_walk import RandomWalkDisturbance
-from stiction_ros.effects.disturbance.sine import SineDisturbance
-from stiction_ros.effects.disturbance.square import SquareDisturbance
-from stiction_ros.effects.disturbance.step import StepDisturbance
-from stiction_ros.effects.disturbance.triangle import TriangleDisturbance
-from stiction_ros.effects.friction.choudhury import ChoudhuryStiction
-from stiction_ros.effects.friction.he import HeStiction
-from stiction_ros.effects.friction.he_smoothed import SmoothedHeStiction
-from stiction_ros.effects.friction.kano import KanoStiction
-from stiction_ros.effects.friction.kano_smoothed import SmoothedKanoStiction
-from stiction_ros.effects.friction.semi_physical import SemiPhysicalStiction
-from stiction_ros.effects.friction.stiction import (
-    FrictionLaw,
-    FrictionPair,
-    JumpForm,
-    SlipJumpPair,
-    Stiction,
+from stiction_ros.effects.disturbance.sine import SineDisturbance as SineDisturbance
+from stiction_ros.effects.disturbance.square import SquareDisturbance as SquareDisturbance
+from stiction_ros.effects.disturbance.step import StepDisturbance as StepDisturbance
+from stiction_ros.effects.disturbance.triangle import TriangleDisturbance as TriangleDisturbance
+from stiction_ros.effects.friction.choudhury import ChoudhuryStiction as ChoudhuryStiction
+from stiction_ros.effects.friction.he import HeStiction as HeStiction
+from stiction_ros.effects.friction.he_smoothed import SmoothedHeStiction as SmoothedHeStiction
+from stiction_ros.effects.friction.kano import KanoStiction as KanoStiction
+from stiction_ros.effects.friction.kano_smoothed import SmoothedKanoStiction as SmoothedKanoStiction
+from stiction_ros.effects.friction.semi_physical import SemiPhysicalStiction as SemiPhysicalStiction
+from stiction_ros.effects.friction.stiction import FrictionLaw as FrictionLaw
+from stiction_ros.effects.friction.stiction import FrictionPair as FrictionPair
+from stiction_ros.effects.friction.stiction import JumpForm as JumpForm
+from stiction_ros.effects.friction.stiction import SlipJumpPair as SlipJumpPair
+from stiction_ros.effects.friction.stiction import Stiction as Stiction
+from stiction_ros.effects.friction.xch import XchStiction as XchStiction
+from stiction_ros.effects.process.delay import ExtraDelay as ExtraDelay
+from stiction_ros.effects.process.gain import ProcessGain as ProcessGain
+from stiction_ros.effects.process.leak import Leak as Leak
+from stiction_ros.effects.process.pole import ExtraPole as ExtraPole
+from stiction_ros.effects.seen import Axis as Axis
+from stiction_ros.effects.seen import FloatArray as FloatArray
+from stiction_ros.effects.seen import Seen as Seen
+from stiction_ros.effects.sensor.bias_step import BiasStep as BiasStep
+from stiction_ros.effects.sensor.clip import Clip as Clip
+from stiction_ros.effects.sensor.freeze import Freeze as Freeze
+from stiction_ros.effects.sensor.quantisation import Quantisation as Quantisation
+from stiction_ros.effects.valve.backlash import Backlash as Backlash
+from stiction_ros.effects.valve.characteristic import Characteristic as Characteristic
+from stiction_ros.effects.valve.characteristic_cubic import (
+    CubicCharacteristic as CubicCharacteristic,
 )
-from stiction_ros.effects.friction.xch import XchStiction
-from stiction_ros.effects.process.delay import ExtraDelay
-from stiction_ros.effects.process.gain import ProcessGain
-from stiction_ros.effects.process.leak import Leak
-from stiction_ros.effects.process.pole import ExtraPole
-from stiction_ros.effects.seen import Axis, FloatArray, Seen
-from stiction_ros.effects.sensor.bias_step import BiasStep
-from stiction_ros.effects.sensor.clip import Clip
-from stiction_ros.effects.sensor.freeze import Freeze
-from stiction_ros.effects.sensor.quantisation import Quantisation
-from stiction_ros.effects.valve.backlash import Backlash
-from stiction_ros.effects.valve.characteristic import Characteristic
-from stiction_ros.effects.valve.characteristic_cubic import CubicCharacteristic
-from stiction_ros.effects.valve.lag import Lag
-from stiction_ros.effects.valve.offset import Offset
-from stiction_ros.effects.valve.saturation import Saturation
-from stiction_ros.effects.valve.slew import Slew
+from stiction_ros.effects.valve.lag import Lag as Lag
+from stiction_ros.effects.valve.offset import Offset as Offset
+from stiction_ros.effects.valve.saturation import Saturation as Saturation
+from stiction_ros.effects.valve.slew import Slew as Slew
 from stiction_ros.errors import InputError
 
 DEFAULT_LAW = "he"
 """Of stiction, where YAML names none."""
-
-__all__ = [
-    "DEFAULT_LAW",
-    "Axis",
-    "Backlash",
-    "Behaviour",
-    "BiasStep",
-    "Characteristic",
-    "ChoudhuryStiction",
-    "Clip",
-    "ColouredDisturbance",
-    "CubicCharacteristic",
-    "DriftDisturbance",
-    "DrivenByNoise",
-    "ExtraDelay",
-    "ExtraPole",
-    "Filter",
-    "FloatArray",
-    "Freeze",
-    "FrictionLaw",
-    "FrictionPair",
-    "HeStiction",
-    "JumpForm",
-    "KanoStiction",
-    "Lag",
-    "Leak",
-    "Memory",
-    "Offset",
-    "Parameter",
-    "ProcessGain",
-    "Quantisation",
-    "RandomWalkDisturbance",
-    "Saturation",
-    "Seen",
-    "SemiPhysicalStiction",
-    "SineDisturbance",
-    "Slew",
-    "SlipJumpPair",
-    "SmoothedHeStiction",
-    "SmoothedKanoStiction",
-    "SquareDisturbance",
-    "StepDisturbance",
-    "Stiction",
-    "TimeShift",
-    "TriangleDisturbance",
-    "Tuning",
-    "XchStiction",
-    "about",
-    "behaviours",
-    "from_mapping",
-    "parameter",
-    "register",
-]
 
 
 def from_mapping(values: Mapping[str, Any]) -> Behaviour:

@@ -3,8 +3,8 @@
 import dataclasses
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,7 @@ class Behaviour(ABC):
         absorbed: whether another linear process would do as well.
         bends: whether it bends the way from OP to PV, without memory.
         in_values: whether the values of PV show it without any model.
+        kernel: function of :mod:`.grid_kernels` that does a whole grid at once; empty for none.
         told_of_step: members that hold for one :meth:`step` alone, not for that of a subclass.
         not_searched: why ``stiction gap`` does not search it, one clause.
 
@@ -104,7 +105,8 @@ class Behaviour(ABC):
     bends: ClassVar[bool] = False
     in_values: ClassVar[bool] = False
     not_searched: ClassVar[str] = "it names no axes on which its figures are searched"
-    told_of_step: ClassVar[tuple[str, ...]] = ("simulate_grid", "filter")
+    kernel: ClassVar[str] = ""
+    told_of_step: ClassVar[tuple[str, ...]] = ("kernel", "simulate_grid", "filter")
 
     def __init_subclass__(cls) -> None:
         """Take back what a base class said of its own :meth:`step` where this one has another."""
@@ -199,7 +201,7 @@ class Behaviour(ABC):
     ) -> FloatArray:
         """Return outputs, shape (N, G), for ``grid`` of shape (G, parameters).
 
-        One after the other, by :meth:`step`; who is searched often does better.
+        By :attr:`kernel`; without one, one point after the other, by :meth:`step`.
 
         Args:
             grid: one set of parameters a row.
@@ -207,8 +209,28 @@ class Behaviour(ABC):
             start: where it had rested before, one for all or shape (G,).
             sample_time: s; only behaviours with a time of their own take notice.
         """
-        rows = zip(grid.tolist(), starts(start, len(grid)).tolist(), strict=True)
+        begun = starts(start, len(grid))
+        if cls.kernel:
+            from stiction_ros.effects import grid_kernels  # compiled: slow to import
+
+            figures = cls.kernel_figures(grid, sample_time)
+            stems = getattr(grid_kernels, cls.kernel)
+            return np.asarray(stems(*figures, np.asarray(values, dtype=float), begun))
+        rows = zip(grid.tolist(), begun.tolist(), strict=True)
         return np.stack([cls(*row).simulate(values, at, sample_time) for row, at in rows], axis=1)
+
+    @classmethod
+    def kernel_figures(cls, grid: FloatArray, sample_time: float) -> Sequence[FloatArray]:
+        """Return what :attr:`kernel` takes of each point of a grid, shape (G,) each.
+
+        These are the parameters, unless a behaviour says otherwise; those that the grid lacks are
+        at their defaults.
+        """
+        figures = [np.ascontiguousarray(column) for column in grid.T]
+        defaults = {field.name: field.default for field in dataclasses.fields(cls)}
+        for entry in cls.parameters()[len(figures) :]:
+            figures.append(np.full(len(grid), defaults[entry.attribute]))
+        return figures
 
     def filter(self, sample_time: float) -> "Filter | None":
         """Return the filter of samples ``sample_time`` s apart; None if not linear, or changing."""
@@ -244,16 +266,25 @@ class Filter:
     d: float  # direct gain
 
 
-@runtime_checkable
-class DrivenByNoise(Protocol):
-    """A behaviour that is random: whoever simulates it draws its numbers.
+@dataclasses.dataclass(frozen=True)
+class DrivenByNoise(Behaviour):
+    """A random wave w: whoever simulates it draws its numbers.
 
     A plant takes :meth:`step_with` in the place of ``step`` and draws from its own seed, the same
-    numbers in every run of that seed. ``step`` still says what it does where nothing is drawn.
+    numbers in every run of that seed. ``step`` says what it does where nothing is drawn: of a wave
+    at rest nothing is expected. The memory is (w, time of the last sample).
     """
 
+    places: ClassVar[tuple[str, ...]] = ("load", "disturbance")
+
+    def rest(self, value: float) -> Memory:
+        return (0.0, NO_SAMPLE)
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        return self.step_with(memory, value, time, 0.0)
+
+    @abstractmethod
     def step_with(
         self, memory: Memory, value: float, time: float, normal: float
     ) -> tuple[Memory, float]:
         """Advance one sample with ``normal`` drawn from N(0, 1)."""
-        ...

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import Behaviour, Filter, FloatArray, Memory, Start
+from stiction_ros.effects.behaviour import Behaviour, Filter, FloatArray, Memory, Start, starts
 
 LONGEST = 1000.0
 
@@ -36,8 +36,7 @@ class Delay(Behaviour):
     def simulate_grid(
         cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
     ) -> FloatArray:
-        starts = np.broadcast_to(np.asarray(start, dtype=float), len(grid))
-        rows = zip(grid[:, 0].tolist(), starts.tolist(), strict=True)
+        rows = zip(grid[:, 0].tolist(), starts(start, len(grid)).tolist(), strict=True)
         return np.stack([_delayed(values, delay, at) for delay, at in rows], axis=1)
 
     def filter(self, sample_time: float) -> Filter:

@@ -45,7 +45,7 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     rules = repairs.Rules(options.strict)
     for note, block in {note: one for one in found.blocks for note in one.mended}.items():
         with foreign(block.path):
-            rules.tell(note, note)
+            rules.tell(note)
     timed = put_right(repairs.each(found.blocks, rules, repairs.with_times), rules)
     timed = repairs.each(timed, rules, partial(repairs.with_values, shared=found.shared))
     if len(timed) > 1:
@@ -53,7 +53,7 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     block, differing = joined(repairs.each(timed, rules, repairs.checked))
     for name, count in differing.items():
         said = f"{name}: {plural(count, 'value')} at a stamp that another table has differ"
-        rules.tell(f"{said}: the later table counts", said, "leave one of them out")
+        rules.tell(f"{said}: the later table counts", "leave one of them out")
     notes = [*dict.fromkeys(note for one in found.blocks for note in one.notes), *rules.told]
     rules.told.clear()
     block = repairs.without_outliers(block, rules)

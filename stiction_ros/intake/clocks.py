@@ -111,8 +111,8 @@ def _turned(block: Block, rules: Rules) -> Block:
     steps = np.diff(block.time)
     if not steps.any() or np.count_nonzero(steps < 0) <= 0.9 * np.count_nonzero(steps):
         return block
-    said = f"time does not increase at {block.place(1)}"
-    rules.tell("rows stood from the last to the first and are turned", said, "sort the rows")
+    note = "rows stood from the last to the first and are turned"
+    rules.tell(note, "sort the rows", block.place(1))
     return block.rows(np.arange(len(block.time))[::-1])
 
 
@@ -215,7 +215,7 @@ def _in_one_time(blocks: Sequence[Block], zone: str, rules: Rules) -> list[Block
         note = f"{change.said}: {count} rows that follow are moved {way}"
         if not zone:
             with foreign(blocks[0].path):
-                rules.tell(note, change.said, FIX)
+                rules.tell(note, FIX)
         elif change.back and seen:
             rules.told.append(note)
     early = 0.0

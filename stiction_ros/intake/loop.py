@@ -4,7 +4,6 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,17 +12,6 @@ from stiction_ros.intake.repairs import outside
 from stiction_ros.intake.tables.block import Block, Key
 from stiction_ros.records.parts import span
 from stiction_ros.records.record import Record
-
-
-class Spread(NamedTuple):
-    """Least, median and largest value of a signal, in the unit of its column."""
-
-    least: float
-    median: float
-    largest: float
-
-    def __str__(self) -> str:
-        return f"{self.least:.4g} to {self.largest:.4g}, median {self.median:.4g}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,9 +27,9 @@ class Loop:
     problem: str | None = None  # why it cannot be read and what helps; None when it can be
     columns: Mapping[str, str] = dataclasses.field(default_factory=dict)  # of each signal, or tag
     op_unit: str = "%"  # what OP is in; OP of a share or a current has been brought to %
-    # signal to the least, median and largest number of its column, in the column's own unit; of
-    # bags OP in %
-    spreads: Mapping[str, Spread] = dataclasses.field(default_factory=dict)
+    # signal to the least, largest and median number of its column, in words and in the column's own
+    # unit; of bags OP in %
+    spreads: Mapping[str, str] = dataclasses.field(default_factory=dict)
     modes: tuple[str, ...] = ()  # words of the mode, each with its count and what it is taken for
 
     @property
@@ -68,13 +56,13 @@ def columns_of(blocks: Sequence[Block]) -> dict[str, str]:
     return {named(key): column.name for one in blocks for key, column in one.columns.items()}
 
 
-def spreads_of(blocks: Sequence[Block]) -> dict[str, Spread]:
+def spreads_of(blocks: Sequence[Block]) -> dict[str, str]:
     """Return what numbers each signal of a loop has, without those far outside all others."""
     measured = (item for block in blocks for item in block.measured.items())
     return _spreads((named(key), column.values) for key, column in measured)
 
 
-def spreads_of_records(parts: Sequence[Record]) -> dict[str, Spread]:
+def spreads_of_records(parts: Sequence[Record]) -> dict[str, str]:
     """Return the same of records, whose OP is in %."""
     found: list[tuple[str, FloatArray]] = []
     for part in parts:
@@ -98,7 +86,7 @@ def modes_of(blocks: Sequence[Block], taken: Mapping[str, str]) -> tuple[str, ..
     )
 
 
-def _spreads(signals: Iterable[tuple[str, FloatArray]]) -> dict[str, Spread]:
+def _spreads(signals: Iterable[tuple[str, FloatArray]]) -> dict[str, str]:
     pieces: dict[str, list[FloatArray]] = {}
     for name, values in signals:
         pieces.setdefault(name, []).append(values)
@@ -106,5 +94,6 @@ def _spreads(signals: Iterable[tuple[str, FloatArray]]) -> dict[str, Spread]:
     for name, values in ((name, np.concatenate(some)) for name, some in pieces.items()):
         usual = values[np.isfinite(values) & ~outside(values)]
         if len(usual):
-            found[name] = Spread(float(usual.min()), float(np.median(usual)), float(usual.max()))
+            middle = np.median(usual)
+            found[name] = f"{usual.min():.4g} to {usual.max():.4g}, median {middle:.4g}"
     return found

@@ -47,10 +47,10 @@ class Rules:
     told: list[str] = dataclasses.field(default_factory=list)
     modes: dict[str, str] = dataclasses.field(default_factory=dict)
 
-    def tell(self, note: str, said: str, fix: str = FIX) -> None:
-        """Note what is repaired; strict, raise an :class:`InputError` that says what is wrong."""
+    def tell(self, note: str, fix: str = FIX, at: str = "") -> None:
+        """Note what is repaired; strict, raise an :class:`InputError` that says where first."""
         if self.strict:
-            raise InputError(said, fix=fix)
+            raise InputError(f"needs a repair: {note}{f', first: {at}' if at else ''}", fix=fix)
         self.told.append(note)
 
 
@@ -76,9 +76,9 @@ def with_times(block: Block, rules: Rules) -> Block:
         fix = f"{FORMS}; or choose the column with --time COLUMN"
         raise InputError(said if strange else block.stray, fix=fix)
     if strange:
-        rules.tell(f"{said}, left out", block.stray)
+        rules.tell(f"{said}, left out")
     if lost > strange:
-        rules.tell(f"{plural(lost - strange, 'row')} without a time left out", block.stray)
+        rules.tell(f"{plural(lost - strange, 'row')} without a time left out", at=block.stray)
     return block.rows(there)
 
 
@@ -94,12 +94,12 @@ def with_values(block: Block, rules: Rules, *, shared: bool) -> Block:
     if not shared:
         row = int(np.argmax(empty))
         note = f"{plural(int(empty.sum()), 'row')} without any value left out"
-        rules.tell(note, f"{block.place(row)} has no value")
+        rules.tell(note, at=block.place(row))
     return block.rows(~empty)
 
 
 def checked(block: Block, rules: Rules) -> Block:
-    """Return the block with what is no number counted; strict, the first such cell is an error."""
+    """Return the block with what is no number counted."""
     for key, column in block.measured.items():
         missing = ~np.isfinite(column.values) & (block.own_mask() != Quality.BAD)
         if missing.all() and key.signal in ("op", "pv"):
@@ -110,12 +110,10 @@ def checked(block: Block, rules: Rules) -> Block:
             )
         if not missing.any():
             continue
-        row, wrong = int(np.argmax(missing)), column.wrong
-        said = wrong.said if wrong is not None and wrong.row == row else "is bad"
         rules.tell(
             f"{column.name}: {plural(int(missing.sum()), 'value')} of {len(missing)} "
             f"missing{_listed(column, missing)}",
-            f"column {column.name} {said} in {block.place(row)}",
+            at=block.place(int(np.argmax(missing))),
         )
     return block
 
@@ -196,7 +194,7 @@ def _without_repeats(block: Block, rules: Rules) -> Block:
     of = f"{next(iter(columns.values())).name}: " if len(columns) == 1 else ""
     said = f"{of}{plural(len(last) - len(first), 'row')} with the time stamp of an earlier row"
     done = f"the last value counts, {differing} differ" if differing else "left out"
-    rules.tell(f"{said}: {done}", said, "remove those that are there twice")
+    rules.tell(f"{said}: {done}", "remove those that are there twice")
     return dataclasses.replace(block.rows(last), columns=columns)
 
 
@@ -212,7 +210,7 @@ def without_outliers(block: Block, rules: Rules) -> Block:
         rules.tell(
             f"{column.name}: {plural(int(far.sum()), 'value')} such as {worst} far outside "
             "all others taken as missing",
-            f"column {column.name} is {worst} in {block.place(row)}, far outside all others",
+            at=block.place(row),
         )
         columns[key] = dataclasses.replace(column, values=np.where(far, np.nan, column.values))
     return block.with_columns(columns)
@@ -254,7 +252,7 @@ def filled(block: Block, rules: Rules) -> Block:
             continue
         if key.signal in ("sp", "stem") and missing.mean() > 0.5:
             note = f"{column.name} is missing at more than half of the rows, left out"
-            rules.tell(note, note)
+            rules.tell(note)
             columns = {k: c for k, c in columns.items() if k.signal != key.signal}
             continue
         short, values = _carried(column.values, missing, block.time, key)
@@ -266,11 +264,9 @@ def filled(block: Block, rules: Rules) -> Block:
     mask[bad] = Quality.BAD
     if held.any():
         samples = plural(int(held.sum()), "sample")
-        note = f"{samples} held over at most {HELD} in a row (PV between its neighbours)"
-        rules.tell(note, f"{samples} missing in OP or PV")
+        rules.tell(f"{samples} held over at most {HELD} in a row (PV between its neighbours)")
     if (bad & ~given).any():
-        note = f"{plural(int((bad & ~given).sum()), 'sample')} bad"
-        rules.tell(f"{note}, cut out", note)
+        rules.tell(f"{plural(int((bad & ~given).sum()), 'sample')} bad, cut out")
     return dataclasses.replace(block, columns=columns, mask=mask if mask.any() else None)
 
 

@@ -60,7 +60,6 @@ def at_pv(block: Block, rules: Rules) -> Block | None:
     rules.tell(
         f"OP and PV have stamps of their own: taken at the {len(time)} of PV, with the last value "
         "of OP and SP at each",
-        "OP and PV have stamps of their own",
         "leave --strict out, or export all tags at the same times",
     )
     rows = np.flatnonzero(chosen)
@@ -100,7 +99,6 @@ def on_grid(block: Block, sample_time: float | None, rules: Rules) -> list[Block
         f"reports when values changed ({', '.join(counts)}) brought onto {samples} samples of "
         f"{step:.6g} s, OP and SP held, PV interpolated; lost is what moved less than was reported "
         f"({', '.join(least)})",
-        f"signals were reported when they changed ({', '.join(counts)})",
         "leave --strict out, or export at a fixed interval",
     )
     return found

@@ -26,15 +26,7 @@ def random_binary(
     """
     if samples < 1 or valves < 1:
         raise InputError(f"{samples} samples of {valves} valves", where="samples", fix="use 1 up")
-    if not 0.0 < switch_probability < 1.0:
-        raise InputError(
-            f"{switch_probability} is no probability of a switch",
-            where="switch_probability",
-            fix="use more than 0 and less than 1",
-        )
     low, high = levels
-    if not (np.isfinite(levels).all() and low < high):
-        raise InputError(f"{low:g}:{high:g} are no levels", where="levels", fix="use LO:HI")
     switches = random.random((samples, valves)) < switch_probability
     switches[0] = random.random(valves) < 0.5
     return np.where(np.cumsum(switches, axis=0) % 2 == 1, high, low)
@@ -51,13 +43,7 @@ def simulate_open_loop(model: LoopModel, op: FloatArray, seed: int) -> ClosedLoo
     return simulate_closed_loop(model, lambda *_: next(rows), None, len(op), seed)
 
 
-def prbs_experiment(
-    model: LoopModel,
-    samples: int,
-    seed: int,
-    switch_probability: float = SWITCH_PROBABILITY,
-    levels: tuple[float, float] = LEVELS,
-) -> Record:
+def prbs_experiment(model: LoopModel, samples: int, seed: int) -> Record:
     """Return the identification experiment of Appendix A on the plant of ``model``.
 
     Every valve moves by :func:`random_binary`, in open loop. The moves and the noise come from
@@ -70,8 +56,6 @@ def prbs_experiment(
         model: plant and starting point.
         samples: N ≥ 1.
         seed: 0 up.
-        switch_probability: of a move at each sample, between 0 and 1.
-        levels: low and high OP, %.
 
     Returns:
         OP and stem in %, shape (N, m); PV in engineering units, shape (N, p); no set-points.
@@ -86,5 +70,5 @@ def prbs_experiment(
     if seed < 0:
         raise InputError(f"{seed} is negative", where="seed")
     moves = np.random.default_rng([seed, 1])
-    op = random_binary(moves, samples, len(model.valves), switch_probability, levels)
+    op = random_binary(moves, samples, len(model.valves))
     return simulate_open_loop(model, op, seed).record

@@ -30,16 +30,14 @@ class _Chain:
     ) -> None:
         self.effects = effects
         self.memories: list[Memory] = [effect.rest(start) for effect in effects]
-        # Asked once: to look at a protocol costs more than a step.
-        self._drawn = [effect if isinstance(effect, DrivenByNoise) else None for effect in effects]
         self._random = random
 
     def output_of(self, value: float, time: float) -> float:
-        for i, (effect, drawn) in enumerate(zip(self.effects, self._drawn, strict=True)):
+        for i, effect in enumerate(self.effects):
             memory = self.memories[i]
-            if drawn is not None:
+            if isinstance(effect, DrivenByNoise):
                 normal = float(self._random.standard_normal())
-                self.memories[i], value = drawn.step_with(memory, value, time, normal)
+                self.memories[i], value = effect.step_with(memory, value, time, normal)
             else:
                 self.memories[i], value = effect.step(memory, value, time)
         return value

@@ -1,6 +1,5 @@
 """Checked reading of YAML: every wrong key, type or number becomes one clear error."""
 
-import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -41,22 +40,19 @@ def parse_yaml(text: str, where: str) -> Any:
         raise InputError(f"no valid YAML ({error})", where=where) from None
 
 
-@dataclasses.dataclass(frozen=True)
-class TextLimits:
-    """What a YAML text from outside may need to be read: time and memory are bounded by these."""
-
-    characters: int = 65_536  # of the text
-    depth: int = 20  # lists and mappings within one another
-    nodes: int = 2000  # values, keys, lists and mappings altogether
+# what a YAML text from outside may need to be read: time and memory are bounded by these
+CHARACTERS = 65_536  # of the text
+DEPTH = 20  # lists and mappings within one another
+NODES = 2000  # values, keys, lists and mappings altogether
 
 
-def parse_limited(text: str, where: str, limits: TextLimits = TextLimits()) -> Any:
+def parse_limited(text: str, where: str) -> Any:
     """Return what a YAML text from outside holds; nothing in the error repeats the text.
 
     It may be longer, deeper or fuller than the limits, have aliases, or be no YAML.
     """
-    if len(text) > limits.characters:
-        raise InputError(f"more than {limits.characters} characters", where=where)
+    if len(text) > CHARACTERS:
+        raise InputError(f"more than {CHARACTERS} characters", where=where)
     depth = nodes = 0
     try:
         for event in yaml.parse(text, Loader=yaml.SafeLoader):
@@ -65,10 +61,10 @@ def parse_limited(text: str, where: str, limits: TextLimits = TextLimits()) -> A
             nodes += isinstance(event, yaml.NodeEvent)
             if isinstance(event, yaml.AliasEvent):
                 raise InputError("aliases are not read", where=where, fix="write values in full")
-            if depth > limits.depth:
-                raise InputError(f"nested deeper than {limits.depth} levels", where=where)
-            if nodes > limits.nodes:
-                raise InputError(f"more than {limits.nodes} keys and values", where=where)
+            if depth > DEPTH:
+                raise InputError(f"nested deeper than {DEPTH} levels", where=where)
+            if nodes > NODES:
+                raise InputError(f"more than {NODES} keys and values", where=where)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f" in line {mark.line + 1}" if mark is not None else ""

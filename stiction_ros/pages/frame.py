@@ -75,9 +75,6 @@ details { margin: 10px 0; border: 1px solid var(--line); border-radius: 8px; pad
 summary { cursor: pointer; }
 pre { overflow-x: auto; font-size: .82rem; line-height: 1.45; }
 figure { margin: 18px 0; } figcaption { margin-top: 4px; max-width: 90ch; }
-figcaption b { color: var(--ink); }
-figure img { display: block; width: 100%; height: auto; background: #fff;
-  border: 1px solid var(--line); border-radius: 8px; padding: 10px; }
 .plot svg { display: block; touch-action: pan-y; overflow: hidden; }
 .square > svg { width: 100%; height: auto; }
 .plot > .over { overflow: visible; width: calc(100% - 92px); margin: 8px 24px 28px 68px; }
@@ -110,12 +107,8 @@ table.list td.trend svg { display: block; margin-left: auto; }
 svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
 .hidden { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%);
   white-space: nowrap; }
-@media screen and (prefers-color-scheme: dark) {
-  figure img { filter: invert(.91) hue-rotate(180deg); } }
 @media (max-width: 760px) {
   main { padding: 18px 14px 44px; }
-  figure img { width: 640px; }
-  figure:has(img) figcaption::before { content: "Move the picture sideways. "; }
   dl { display: block; } dd { margin: 0 0 6px; }
   table.list, table.list thead, table.list tbody { display: block; }
   table.list thead:not(:has(button)) { display: none; }

@@ -5,7 +5,6 @@ smoothed law (5) at τ = 10⁴; for each choice of delays ARX is fitted by least
 mean SE (14) wins. Nothing is shared between points: this is the baseline.
 """
 
-import dataclasses
 import itertools
 import time
 from collections.abc import Callable
@@ -25,16 +24,6 @@ from stiction_ros.signals.arx_fit import ArxOrders, Delays
 MAX_POINTS = 2_000_000
 MAX_CHOICES = 20_000
 Progress = Callable[[float], None]
-
-
-@dataclasses.dataclass(frozen=True)
-class GridPoint:
-    """The best point of a grid."""
-
-    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
-    delays: Delays  # for each output the t_d of each valve, samples
-    found: EquationError  # stems and ARX models there; its ``squared_error`` is (12a)
-    points: int  # grid points that were worked through
 
 
 def nodes(limit: float, step: float) -> FloatArray:
@@ -60,7 +49,7 @@ def count_points(record: Record, options: PaperOptions) -> int:
 def identify_by_grid(
     record: Record, options: PaperOptions | None = None, progress: Progress | None = None
 ) -> PaperIdentification:
-    """Identify by the grid search; the options have its ``grid_step`` and ``grid_law``.
+    """Identify by the grid search; the options have its ``grid_step``.
 
     Raises:
         InputError: a record that no model can be fitted to, a step coarser than the OP span,
@@ -69,18 +58,13 @@ def identify_by_grid(
     begun = time.perf_counter()
     options = options or PaperOptions(method="grid")
     orders = one_step.check_record(record, options)
-    best = search(record, options, orders, progress or (lambda share: None))
-    stable = all(fit.largest_root < 1.0 for fit in best.found.fits)
-    reason = "" if stable else "the process at the best point is unstable"
-    answer = one_step.Answer(
-        reason, best.friction, best.delays, best.found.squared_error, best.points, best.found
-    )
+    answer = search(record, options, orders, progress or (lambda share: None))
     return one_step.result(record, options, answer, time.perf_counter() - begun)
 
 
 def search(
     record: Record, options: PaperOptions, orders: ArxOrders, progress: Progress
-) -> GridPoint:
+) -> one_step.Answer:
     """Return the grid point and delays of lowest mean SE; see :func:`identify_by_grid`."""
     limits = one_step.friction_limits(record, options)
     if options.grid_step > limits.max():
@@ -97,21 +81,19 @@ def search(
             fix="choose a larger step or a friction limit",
         )
     choices = one_step.delay_choices(record, options, MAX_CHOICES)
-    law, hard = smooth_law(options.law), options.grid_law == "hard"
-    smoothing = final_smoothing(limits)
-    best: GridPoint | None = None
+    law, smoothing = smooth_law(options.law), final_smoothing(limits)
+    best: tuple[EquationError, FloatArray, Delays] | None = None
     triangles = [nodes(limit, options.grid_step) for limit in limits.tolist()]
     for number, rows in enumerate(itertools.product(*triangles), start=1):
         friction = np.array(rows)
-        stems = (
-            law.hard_stems(record.op, friction)
-            if hard
-            else law.stems(record.op, friction, smoothing)
-        )
+        stems = law.stems(record.op, friction, smoothing)
         for delays in choices:
             found = fit_outputs(record.pv, stems, delays, orders)
-            if best is None or found.squared_error < best.found.squared_error:
-                best = GridPoint(friction, delays, found, total)
+            if best is None or found.squared_error < best[0].squared_error:
+                best = found, friction, delays
         progress(number / total)
     assert best is not None  # every triangle has its corner (0, 0)
-    return best
+    found, friction, delays = best
+    stable = all(fit.largest_root < 1.0 for fit in found.fits)
+    reason = "" if stable else "the process at the best point is unstable"
+    return one_step.Answer(reason, friction, delays, found.squared_error, total, found)

@@ -19,8 +19,7 @@ def identify(
     no model can be fitted to, or with OP and PV clearly swapped, is refused.
     """
     options = options or PaperOptions()
-    if options.check_columns:
-        refuse_swapped(record, swapped_columns(record))
+    refuse_swapped(record, swapped_columns(record))
     # Each is slow to import.
     if options.method == "grid":
         from stiction_ros.paper.grid_search import identify_by_grid as search

@@ -8,7 +8,6 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions
 
 METHOD_NAMES = ("nlp", "nlp_printed", "grid")
-GRID_LAWS = ("smoothed", "hard")
 OutputOrders = int | tuple[int, ...]
 InputOrders = int | tuple[int | tuple[int, ...], ...]
 
@@ -35,12 +34,9 @@ class PaperOptions:
     friction_limit: float | tuple[float, ...] | None = None
     starts: int = 7  # M, first guesses of the nonlinear programme for every choice of delays
     grid_step: float = 0.5  # step of f_S and of f_D, %
-    grid_law: str = "smoothed"  # stem of the grid, ``smoothed`` as published or ``hard``
-    check_columns: bool = True  # refuse a record in which OP and PV are clearly swapped
 
     def __post_init__(self) -> None:
-        for key, known in (("method", METHOD_NAMES), ("grid_law", GRID_LAWS)):
-            one_of(getattr(self, key), known, key)
+        one_of(self.method, METHOD_NAMES, "method")
         if not 1 <= self.starts <= 1000:
             raise InputError(f"{self.starts} lies outside 1 to 1000", where="starts")
         if not (math.isfinite(self.grid_step) and self.grid_step > 0.0):
@@ -58,10 +54,8 @@ class PaperOptions:
     @classmethod
     def of(cls, options: IdentificationOptions, method: str, **chosen: object) -> "PaperOptions":
         """Return options of a method of the paper with the orders and delays of ``options``."""
-        shared = {
-            key: getattr(options, key)
-            for key in ("output_order", "input_order", "delay", "friction_limit", "check_columns")
-        }
+        keys = ("output_order", "input_order", "delay", "friction_limit")
+        shared = {key: getattr(options, key) for key in keys}
         return cls(method=method, **(shared | {"law": options.first_law} | chosen))
 
 

@@ -1,6 +1,7 @@
 """What a search tried and what its answer is worth, for reports and benchmarks."""
 
 import dataclasses
+import math
 from typing import Any
 
 from stiction_ros.identification.result import Identification
@@ -25,8 +26,8 @@ class SolvedStart:
 
     @property
     def accepted(self) -> bool:
-        """Whether it may win."""
-        return self.feasible and self.stable
+        """Whether it may win: finite, feasible and stable."""
+        return self.feasible and self.stable and math.isfinite(self.objective)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values."""

@@ -1,6 +1,5 @@
 """The report of a discrepancy: the gap before and after, what names the effect, the rivals."""
 
-import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,11 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapVerdict, Look
-from stiction_ros.discrepancy.answer.preview import Preview, preview
 from stiction_ros.discrepancy.gap.measure import levelled
-from stiction_ros.effects import FloatArray
 from stiction_ros.pages.frame import framed, text
-from stiction_ros.pages.plot import KINDS, SCRIPT, Curve, against, over_time
+from stiction_ros.pages.plot import SCRIPT, Curve, over_time
 from stiction_ros.report import gap_words as say
 from stiction_ros.report.page import Cell, card, folded, number, table, write_page
 from stiction_ros.signals.holds import stretches
@@ -87,9 +84,7 @@ def _decides(found: Discrepancy) -> list[str]:
     if not found.experiment:
         return []
     said = found.experiment[0].upper() + found.experiment[1:]
-    shown = preview(found)
-    figures = "" if shown is None else preview_figures(shown)
-    return [f"<h2>What would decide</h2><p>{text(said)}.</p>", figures]
+    return [f"<h2>What would decide</h2><p>{text(said)}.</p>"]
 
 
 def _noise(found: Discrepancy) -> str:
@@ -228,28 +223,12 @@ def _tracks(found: Discrepancy, look: Look) -> str:
         return ""
     track = look.where.tracks[0]
     place, curve = say.plain(track.place), Curve("disturbance", "free", track.wave)
-    driver, label = _driver(found, look, track.place)
     time = np.arange(float(len(found.runs))) * found.runs.sample_time
     return over_time(
         f"The slow disturbance at {place} that would close the gap. A step or a ramp in it is a "
         "disturbance.",
         *(time, [curve], f"missing at {text(place)}"),
-    ) + against(
-        f"The same against {label}. A loop is play or friction, a bend is a characteristic or a "
-        "limit.",
-        [(driver, curve)],
-        (text(label), f"missing at {text(place)}"),
-        equal=False,
     )
-
-
-def _driver(found: Discrepancy, look: Look, place: str) -> tuple[FloatArray, str]:
-    kind, _, tag = place.partition(":")
-    names = found.model_before.valve_names
-    if kind == "valve":
-        return found.runs.op[:, names.index(tag)], f"OP of {tag} (%)"
-    i = found.model_before.outputs.index(tag)
-    return look.scores.base.run.forced[:, i], f"free run of {tag}"
 
 
 def effect_card(effect: FoundEffect) -> str:
@@ -301,38 +280,6 @@ def _liveliest(moves: np.ndarray[tuple[int], np.dtype[np.float64]]) -> slice:
     inside = squares[count:] - squares[:-count]
     first = int(np.argmax(inside))
     return slice(first, first + count)
-
-
-def preview_figures(preview: Preview) -> str:
-    """Return what each rival would show in the experiment that decides."""
-    time = np.arange(float(len(preview.op))) * preview.sample_time
-    rivals = [(say.called(rival.place, rival.effect), rival) for rival in preview.rivals]
-    signals = {
-        "stem": "stem (%)",
-        "pv": f"{preview.output} as the sensor shows it",
-        "true": f"{preview.output} itself, as a second sensor would show it",
-    }
-    op = over_time(
-        "What would decide: OP moved by hand with the controller off: up, back, and one step, "
-        "without noise.",
-        *(time, [Curve(f"OP of {preview.valve}", "op", preview.op, steps=True)], "%"),
-    )
-    figures = []
-    for signal, label in signals.items():
-        drawn = [
-            Curve(name, kind, getattr(rival, signal))
-            for (name, rival), kind in zip(rivals, itertools.cycle(KINDS), strict=False)
-        ]
-        differ = _apart([curve.values for curve in drawn])
-        said = f"{label}: {'the rivals differ' if differ else 'the rivals are alike'}."
-        figures.append(over_time(said[0].upper() + said[1:], time, drawn, text(label)))
-    return op + "".join(figures)
-
-
-def _apart(signals: list[np.ndarray[tuple[int], np.dtype[np.float64]]]) -> bool:
-    spread = max(float(np.ptp(each)) for each in signals)
-    first = signals[0]
-    return any(float(np.abs(each - first).max()) > 0.02 * max(spread, 1e-12) for each in signals)
 
 
 def change_lines(found: Discrepancy) -> list[str]:

@@ -24,7 +24,6 @@ class Reached:
     """How far a survey is."""
 
     done: int  # loops that have their row
-    before: int  # of these, those that were taken from the survey that it goes on with
     drawn: int  # loops that were read
     entry: Entry  # the last row
 
@@ -129,17 +128,12 @@ class _Run:
 
     def _show(self, progress: Progress | None, entry: Entry) -> None:
         if progress is not None:
-            progress(Reached(len(self.entries), self.before, self.drawn, entry))
+            progress(Reached(len(self.entries), self.drawn, entry))
 
     def _tasks(self, loops: Iterable[Loop], progress: Progress | None) -> Iterator[Task]:
         """Yield the loops that are not known yet; those that are, are taken as they are."""
-        seen: dict[str, int] = {}
         for loop in loops:
             self.drawn += 1
-            number = seen.get(loop.name, 0) + 1
-            seen[loop.name] = number
-            if number > 1:  # two files of one name in two folders are two loops
-                loop = dataclasses.replace(loop, name=f"{loop.name} ({number})")
             key = key_of(loop)
             known = None if self.journal is None else self.journal.known.get(key)
             if known is None:

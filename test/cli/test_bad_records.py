@@ -54,10 +54,10 @@ def same(rows: Rows) -> Rows:
     ("spoil", "options", "words"),
     [
         (constant_op, (), "op of V1 is constant"),
-        (gap_of_nan, ("--strict",), "not a finite number in line 102"),
+        (gap_of_nan, ("--strict",), "first: line 102"),
         (twenty, (), "20 samples are too few"),
         (irregular, ("--strict",), "time is irregular"),
-        (text, ("--strict",), "'Bad', not a number in line 52"),
+        (text, ("--strict",), "'Bad'), first: line 52"),
         (swapped, (), "OP and PV look swapped"),
         (same, ("--delay", "0:390"), "samples are too few"),
     ],

@@ -36,24 +36,6 @@ def test_experiment_says_how_to_read_its_record(
     assert json.loads(capsys.readouterr().out)["samples"] == 300
 
 
-def test_experiment_takes_levels_and_probability(tmp_path: Path) -> None:
-    path = tmp_path / "p.csv"
-    options = [
-        "--samples",
-        "2000",
-        "--levels",
-        "30:45",
-        "--switch-probability",
-        "0.5",
-        "--seed",
-        "2",
-    ]
-    assert main(["experiment", "prbs", *options, "--out", str(path)]) == 0
-    op = np.loadtxt(path, delimiter=",", skiprows=1)[:, 1]
-    assert set(op) == {30.0, 45.0}
-    assert (np.diff(op) != 0.0).mean() == pytest.approx(0.5, abs=0.06)
-
-
 @pytest.mark.parametrize("kind", ["arx", "state_space"])
 def test_fit_linear_prints_the_contract_as_json(
     kind: str, prbs: Path, capsys: pytest.CaptureFixture[str]

@@ -1,10 +1,11 @@
 import json
+import time
 from pathlib import Path
 
 import pytest
 
 from stiction_ros.cli.main import main
-from stiction_ros.cli.survey_progress import Counted, Forecast, Lines
+from stiction_ros.cli.survey_progress import Counted, Lines, progress
 from stiction_ros.errors import InputError
 from stiction_ros.survey import survey as surveying
 from stiction_ros.survey.engines import dask as dask_engine
@@ -102,19 +103,15 @@ def test_an_interrupt_says_how_to_go_on(
     assert "interrupted; --resume goes on" in capsys.readouterr().err
 
 
-def test_a_forecast_goes_by_the_loops_of_this_run() -> None:
-    now, told = [0.0], []
+def test_a_file_is_told_of_the_loops_that_are_done(capsys: pytest.CaptureFixture[str]) -> None:
     entry = Entry("FIC1", (), Status.OK)
-    forecast = Forecast(
-        lambda share, words: told.append((share, words)), lambda: 60, lambda: now[0]
-    )
-    forecast(Reached(50, 50, 50, entry))
-    now[0] = 20.0
-    forecast(Reached(52, 50, 54, entry))
-    forecast(Reached(60, 50, 60, entry))
-    assert told[0] == (50 / 60, "50 of 60 loops: FIC1")
-    assert told[1] == (52 / 60, "52 of 60 loops, about 80 s left: FIC1")
-    assert told[2] == (1.0, "60 of 60 loops: FIC1")
+    with progress(None) as tell:
+        tell(Reached(1, 2, entry))
+    with progress([]) as tell:
+        time.sleep(0.2)
+        tell(Reached(50, 60, entry))
+    said = capsys.readouterr().err
+    assert said.startswith("survey: 50 of 60 loops: FIC1")
 
 
 def test_a_file_gets_a_line_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:

@@ -148,7 +148,7 @@ def test_two_columns_of_numbers_and_no_name(
 
 
 MENDS: list[tuple[str, Callable[[list[list[str]]], object]]] = [
-    ("is 'Bad'", lambda rows: rows[7].__setitem__(1, "50.0")),
+    ("(1 'Bad')", lambda rows: rows[7].__setitem__(1, "50.0")),
     ("time does not increase", lambda rows: rows.sort()),
 ]
 

@@ -82,7 +82,7 @@ def test_strict_refuses_what_is_repaired_otherwise(
     assert main(["convert", str(path), str(tmp_path / "b.csv")]) == 0
     assert "OP: 1 value of 120 missing" in capsys.readouterr().err
     assert main(["convert", str(path), str(tmp_path / "c.csv"), "--strict"]) == 2
-    assert "column OP is 'Bad', not a number in line 9" in capsys.readouterr().err
+    assert "OP: 1 value of 120 missing (1 'Bad'), first: line 9" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

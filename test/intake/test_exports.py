@@ -52,7 +52,7 @@ def test_packed_text(tmp_path: Path, pack: str) -> None:
     check(loop)
     assert loop.name == "FIC1"
     path.write_bytes(packed[: len(packed) // 2])
-    assert "is cut off or damaged" in str(one(path).problem)
+    assert "cut off or damaged" in str(one(path).problem)
 
 
 @pytest.mark.parametrize(
@@ -267,7 +267,7 @@ def test_bad_values_are_held_or_cut_and_counted(tmp_path: Path, word: str) -> No
     assert "2 samples held" in said(loop)
     assert "10 samples bad, cut out" in said(loop)
     strict = one(path, strict=True)
-    assert "in line 22" in str(strict.problem)
+    assert "first: line 22" in str(strict.problem)
 
 
 def test_a_column_of_qualities(tmp_path: Path) -> None:

@@ -157,8 +157,8 @@ def test_every_public_name_has_its_page() -> None:
         f"stiction_ros.{home.replace(':', '.') if ':' in home else f'{home}.{name}'}"
         for name, home in stiction_ros._HOMES.items()
     }
-    of_effects = (getattr(stiction_ros.effects, name) for name in stiction_ros.effects.__all__)
-    tools = {f"{each.__module__}.{each.__name__}" for each in of_effects if callable(each)}
+    of_effects = [each for each in vars(stiction_ros.effects).values() if callable(each)]
+    tools = {f"{each.__module__}.{each.__name__}" for each in of_effects}
     assert len(shown) == len(set(shown))
     assert homes <= set(shown) <= homes | tools
     wanted = ("parameter", "FrictionPair", "SlipJumpPair", "JumpForm", "Axis", "Seen", "register")

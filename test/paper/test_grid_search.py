@@ -11,8 +11,7 @@ from stiction_ros.paper.methods import identify
 from stiction_ros.paper.paper_options import PaperOptions
 
 
-@pytest.mark.parametrize("law", ["smoothed", "hard"])
-def test_truth_on_the_grid_is_found(law: str) -> None:
+def test_truth_on_the_grid_is_found() -> None:
     record = loops.example1(1, "equation", samples=900)
     options = PaperOptions(
         method="grid",
@@ -21,7 +20,6 @@ def test_truth_on_the_grid_is_found(law: str) -> None:
         delay=(4, 6),
         grid_step=1.0,
         friction_limit=6.0,
-        grid_law=law,
     )
     seen: list[float] = []
     found = identify(record, options, seen.append)

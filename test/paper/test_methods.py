@@ -32,7 +32,6 @@ def test_each_method_signs_its_result(method: str) -> None:
     "wrong",
     [
         {"method": "exact"},
-        {"grid_law": "kano"},
         {"starts": 0},
         {"grid_step": 0.0},
         {"grid_step": float("nan")},

@@ -8,10 +8,9 @@ from made import GAIN, entry, identification, record
 
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.groups import Group
-from stiction_ros.survey.listing.headline import in_words
+from stiction_ros.survey.listing.headline import Earlier, in_words
 from stiction_ros.survey.listing.page import list_page
 from stiction_ros.survey.pages.loop_page import loop_page
-from stiction_ros.survey.pages.trend import Earlier, trend_of, with_trend
 from stiction_ros.survey.pages.words import in_op_unit, period
 from stiction_ros.survey.survey import Survey
 
@@ -177,18 +176,6 @@ def test_tags_and_reasons_are_no_html(list_file: Path) -> None:
     source = list_file.read_text(encoding="utf-8")
     assert "<b>TIC" not in source
     assert "&lt;b&gt;TIC" in source
-
-
-def test_a_trend_is_put_into_the_page_once(loop_file: Path) -> None:
-    page = loop_file.read_text(encoding="utf-8")
-    for earlier, told in ((EARLIER[1:], "2 → 3 %"), (EARLIER, "1 → 3 %")):
-        trend = trend_of(entry("FIC-101.A"), earlier)
-        assert trend is not None
-        shown = with_trend(page, trend, 3.0)
-        assert f"Band f_S + f_D: {told}" in shown
-        assert "2023-12-02: 2, now: 3" in shown
-        assert with_trend(shown, trend, 3.0) == shown
-        assert shown.endswith(page[-2000:])
 
 
 def test_trends_have_figures_and_one_scale(list_file: Path) -> None:

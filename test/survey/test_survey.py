@@ -120,13 +120,6 @@ def test_other_options_do_not_go_on_with_it(tmp_path: Path) -> None:
         survey(_loops(1), Plan(SurveyOptions(), resume=True), Counting())
 
 
-def test_loops_of_one_name_stay_two(tmp_path: Path) -> None:
-    twice = [unreadable(1), dataclasses.replace(unreadable(1), files=(Path("other/1.csv"),))]
-    found = survey(twice, Plan(SurveyOptions(), tmp_path), Counting())
-    assert sorted(e.name for e in found.entries) == ["FIC001", "FIC001 (2)"]
-    assert len({e.report for e in found.entries}) == 2
-
-
 def test_names_of_loops_make_names_of_files(tmp_path: Path) -> None:
     names = ["../../etc/x", "A/B", "A B", "…"]
     loops = [dataclasses.replace(unreadable(1), name=name) for name in names]

@@ -5,7 +5,6 @@ import csv
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake import CsvColumns, IntakeOptions, Loop, loops, one_loop
@@ -38,6 +37,17 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_record(
+    parser: argparse.ArgumentParser,
+    text: str = "CSV file, other export, or bag",
+    metavar: str = "RECORD",
+) -> None:
+    """Add the one record that a command takes, and the options by which it is read."""
+    parser.add_argument("record", metavar=metavar, help=text)
+    add_columns(parser)
+    add_intake(parser)
+
+
 def add_intake(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
     """Add the options of exports to a command that takes one loop, or ``many``."""
     group = parser.add_argument_group("exports")
@@ -51,22 +61,19 @@ def add_intake(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
         group.add_argument("--loop", metavar="NAME", help="the loop, where a file holds several")
     group.add_argument(
         "--op-unit",
-        type=OpUnit,
-        choices=tuple(OpUnit),
+        choices=[unit.value for unit in OpUnit],
         metavar="UNIT",
         help=f"unit of OP: {', '.join(OpUnit)} (default: the unit in the export, else %%)",
     )
     group.add_argument(
         "--time-unit",
-        type=TimeUnit,
-        choices=tuple(TimeUnit),
+        choices=[unit.value for unit in TimeUnit],
         metavar="UNIT",
         help=f"unit of times that are numbers: {', '.join(TimeUnit)}",
     )
     group.add_argument(
         "--dates",
-        type=DateOrder,
-        choices=tuple(DateOrder),
+        choices=[order.value for order in DateOrder],
         help="whether the day or the month is first in dates",
     )
     group.add_argument(
@@ -95,13 +102,8 @@ def add_intake(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
 
 def columns(options: argparse.Namespace) -> CsvColumns:
     """Return the chosen columns."""
-    chosen: dict[str, Any] = {}
-    for key in ("op", "pv", "sp", "stem"):
-        if getattr(options, key, None):
-            chosen[key] = dict(getattr(options, key))
-    if getattr(options, "time", None) is not None:
-        chosen["time"] = options.time
-    return CsvColumns(**chosen)
+    op, pv, sp, stem = (dict(getattr(options, key)) or None for key in ("op", "pv", "sp", "stem"))
+    return CsvColumns(op, pv, sp, stem, options.time)
 
 
 def intake_options(options: argparse.Namespace) -> IntakeOptions:
@@ -111,12 +113,12 @@ def intake_options(options: argparse.Namespace) -> IntakeOptions:
         raise InputError(f"{step:g} s is no sample time", where="--sample-time")
     return IntakeOptions(
         columns=columns(options),
-        namespace=getattr(options, "namespace", None),
+        namespace=options.namespace,
         tags=None if options.tags is None else Path(options.tags),
         strict=options.strict,
-        op_unit=options.op_unit,
-        time_unit=options.time_unit,
-        dates=options.dates,
+        op_unit=None if options.op_unit is None else OpUnit(options.op_unit),
+        time_unit=None if options.time_unit is None else TimeUnit(options.time_unit),
+        dates=None if options.dates is None else DateOrder(options.dates),
         sample_time=step,
         long=options.long,
         automatic=None if options.auto is None else tuple(options.auto),
@@ -147,8 +149,16 @@ def opened(options: argparse.Namespace) -> Loop:
     return one_loop(path, intake_options(options), options.loop)
 
 
+def dry_run(options: argparse.Namespace) -> int:
+    """Print what would be read of all files that a command was given, but loop models."""
+    one = [options.record] if "record" in options else []
+    given = [*one, *getattr(options, "inputs", ()), *getattr(options, "paths", ())]
+    paths = [Path(source) for source in given if not is_model(source)]
+    return show_loops(paths, intake_options(options))
+
+
 def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
-    """Print what would be read from where, ``--dry-run``; 1 when no loop can be read."""
+    """Print what would be read from where; 1 when no loop can be read."""
     readable = known = 0
     for loop in loops(paths, options):
         known += 1
@@ -161,7 +171,7 @@ def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
         for note in loop.notes:
             print(f"  note: {note}")
     print(f"{plural(known, 'loop')}, {readable} can be read" if known else "no file of a loop")
-    if len(paths) > 1 or paths[0].is_dir():
+    if len(paths) > 1 or any(path.is_dir() for path in paths):
         tell_strangers(options.tags, "export", strange_files(paths, options))
     return 0 if readable else 1
 

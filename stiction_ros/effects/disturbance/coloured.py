@@ -4,21 +4,18 @@ import dataclasses
 import math
 from typing import ClassVar
 
-from stiction_ros.effects.behaviour import NO_SAMPLE, Memory, elapsed, parameter
-from stiction_ros.effects.disturbance.drawn import DrawnDisturbance
+from stiction_ros.effects.behaviour import NO_SAMPLE, DrivenByNoise, Memory, elapsed, parameter
 
 
 @dataclasses.dataclass(frozen=True)
-class ColouredDisturbance(DrawnDisturbance):
+class ColouredDisturbance(DrivenByNoise):
     r"""Adds first-order autoregressive noise of a given spread and time constant.
 
     .. math::
         w_k = \alpha w_{k-1} + \sigma \sqrt{1 - \alpha^2} \, n_k, \quad
         \alpha = e^{-T_s/\tau}, \; n_k \sim N(0, 1)
 
-    The memory is (w, time of the last sample). Who simulates it draws n; the plant does so
-    from a source of its own, so that the other noise stays what it was. :meth:`step` draws
-    nothing: it adds what is expected of w, which from rest is nothing.
+    The plant draws n from a source of its own, so that the other noise stays what it was.
     """
 
     effect: ClassVar[str] = "coloured"
@@ -34,7 +31,6 @@ class ColouredDisturbance(DrawnDisturbance):
     def step_with(
         self, memory: Memory, value: float, time: float, normal: float
     ) -> tuple[Memory, float]:
-        """Advance one sample with ``normal`` drawn from N(0, 1)."""
         assert isinstance(memory, tuple)
         last, before = memory
         keep = 0.0 if before == NO_SAMPLE else math.exp(-elapsed(before, time) / self.time_constant)

@@ -4,18 +4,14 @@ import dataclasses
 import math
 from typing import ClassVar
 
-from stiction_ros.effects.behaviour import NO_SAMPLE, Memory, elapsed, parameter
-from stiction_ros.effects.disturbance.drawn import DrawnDisturbance
+from stiction_ros.effects.behaviour import NO_SAMPLE, DrivenByNoise, Memory, elapsed, parameter
 
 
 @dataclasses.dataclass(frozen=True)
-class RandomWalkDisturbance(DrawnDisturbance):
+class RandomWalkDisturbance(DrivenByNoise):
     r"""Adds a random walk that starts at zero with the first sample.
 
     .. math:: w_k = w_{k-1} + \sigma \sqrt{T_s} \, n_k, \quad n_k \sim N(0, 1)
-
-    The memory is (w, time of the last sample). Who simulates it draws n; :meth:`step` draws
-    nothing, so that from rest it adds nothing.
     """
 
     effect: ClassVar[str] = "random_walk"
@@ -30,7 +26,6 @@ class RandomWalkDisturbance(DrawnDisturbance):
     def step_with(
         self, memory: Memory, value: float, time: float, normal: float
     ) -> tuple[Memory, float]:
-        """Advance one sample with ``normal`` drawn from N(0, 1)."""
         assert isinstance(memory, tuple)
         last, before = memory
         spent = 0.0 if before == NO_SAMPLE else elapsed(before, time)

@@ -3,9 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
-from stiction_ros.effects.behaviour import FloatArray, Memory, Start, starts
+from stiction_ros.effects.behaviour import Memory
 from stiction_ros.effects.friction.moving_rules import SlopeRules
 from stiction_ros.effects.friction.stiction import NOT_SEARCHED, JumpForm, SlipJumpPair, Switching
 
@@ -47,6 +45,7 @@ class ChoudhuryStiction(SlipJumpPair):
     law: ClassVar[str | None] = "choudhury"
     not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching] = SlopeRules
+    kernel: ClassVar[str] = "choudhury_stems"
 
     def rest(self, value: float) -> Memory:
         return (value, value, 0.0, value, self.static_friction, self.static_friction)
@@ -72,13 +71,3 @@ class ChoudhuryStiction(SlipJumpPair):
             stem = value - slope * self.dynamic_friction
             up = down = MOVING
         return (stem, value, slope, stuck_at, up, down), stem
-
-    @classmethod
-    def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
-    ) -> FloatArray:
-        from stiction_ros.effects.grid_kernels import choudhury_stems  # compiled: slow to import
-
-        band, jump = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
-        rest = starts(start, len(band))
-        return choudhury_stems(band, jump, np.asarray(values, dtype=float), rest)

@@ -3,9 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
-from stiction_ros.effects.behaviour import FloatArray, Memory, Start
+from stiction_ros.effects.behaviour import Memory
 from stiction_ros.effects.friction.stiction import (
     NOT_SEARCHED,
     SLIPS,
@@ -40,6 +38,7 @@ class HeStiction(FrictionPair):
     law: ClassVar[str | None] = "he"
     not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching] = SLIPS
+    kernel: ClassVar[str] = "he_stems"
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
         """Return the stem χ, %, twice, as memory and as output, of OP ``value``, %, by (4)."""
@@ -56,18 +55,3 @@ class HeStiction(FrictionPair):
     def jump_form(self) -> JumpForm:
         """Return the moves that the valve can make when OP rests between them."""
         return JumpForm(self, self.static_friction, self.dynamic_friction)
-
-    @classmethod
-    def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
-    ) -> FloatArray:
-        """Return stems, %, shape (N, G), of OP ``values``, (N,), for rows (f_S, f_D) of ``grid``.
-
-        They begin at ``start``, %, one for all or shape (G,); ``sample_time`` has no meaning here.
-        """
-        # Compiled code takes half a second to import, which nodes that scan no grid save.
-        from stiction_ros.effects.grid_kernels import he_stems
-
-        static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
-        starts = np.broadcast_to(np.asarray(start, dtype=float), static.shape)
-        return he_stems(static, dynamic, np.asarray(values, dtype=float), starts.copy())

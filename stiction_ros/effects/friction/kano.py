@@ -3,9 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
-from stiction_ros.effects.behaviour import FloatArray, Memory, Start, starts
+from stiction_ros.effects.behaviour import Memory
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.stiction import NOT_SEARCHED, JumpForm, SlipJumpPair, Switching
 
@@ -42,6 +40,7 @@ class KanoStiction(SlipJumpPair):
     law: ClassVar[str | None] = "kano"
     not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching] = FollowingRules
+    kernel: ClassVar[str] = "kano_stems"
 
     def rest(self, value: float) -> Memory:
         return (value, value, 0.0, value + self.dynamic_friction, 1.0, 1.0)
@@ -63,12 +62,3 @@ class KanoStiction(SlipJumpPair):
 
     def jump_form(self) -> JumpForm:
         return JumpForm(self, self.static_friction, self.dynamic_friction)
-
-    @classmethod
-    def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
-    ) -> FloatArray:
-        from stiction_ros.effects.grid_kernels import kano_stems  # compiled: slow to import
-
-        band, jump = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
-        return kano_stems(band, jump, np.asarray(values, dtype=float), starts(start, len(band)))

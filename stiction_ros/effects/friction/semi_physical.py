@@ -3,9 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
-from stiction_ros.effects.behaviour import FloatArray, Memory, Start, parameter
+from stiction_ros.effects.behaviour import Memory, parameter
 from stiction_ros.effects.friction.stiction import NOT_SEARCHED, FrictionPair, JumpForm
 
 
@@ -44,6 +42,7 @@ class SemiPhysicalStiction(FrictionPair):
     law: ClassVar[str | None] = "semi_physical"
     not_searched: ClassVar[str] = NOT_SEARCHED
     held: ClassVar[tuple[str, ...]] = ("k",)  # as published; every slip hangs on its last digits
+    kernel: ClassVar[str] = "semi_physical_stems"
 
     overshoot: float = parameter("k", "1", "overshoot factor K", low=1.0, high=2.0, default=1.99)
 
@@ -58,16 +57,3 @@ class SemiPhysicalStiction(FrictionPair):
 
     def jump_form(self) -> JumpForm:
         return JumpForm(self, self.static_friction, self.dynamic_friction, self.overshoot)
-
-    @classmethod
-    def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
-    ) -> FloatArray:
-        from stiction_ros.effects.grid_kernels import semi_physical_stems  # compiled
-
-        static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
-        overshoot = grid[:, 2].copy() if grid.shape[1] > 2 else np.full(len(grid), 1.99)
-        starts = np.broadcast_to(np.asarray(start, dtype=float), static.shape).copy()
-        return semi_physical_stems(
-            static, dynamic, overshoot, np.asarray(values, dtype=float), starts
-        )

@@ -3,9 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
-from stiction_ros.effects.behaviour import FloatArray, Memory, Start, starts
+from stiction_ros.effects.behaviour import Memory
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.stiction import NOT_SEARCHED, FrictionPair, JumpForm, Switching
 
@@ -44,6 +42,7 @@ class XchStiction(FrictionPair):
     law: ClassVar[str | None] = "xch"
     not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching] = FollowingRules
+    kernel: ClassVar[str] = "xch_stems"
 
     def rest(self, value: float) -> Memory:
         return (value, value, 0.0)
@@ -61,13 +60,3 @@ class XchStiction(FrictionPair):
 
     def jump_form(self) -> JumpForm:
         return JumpForm(self, self.static_friction, self.dynamic_friction)
-
-    @classmethod
-    def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
-    ) -> FloatArray:
-        from stiction_ros.effects.grid_kernels import xch_stems  # compiled: slow to import
-
-        static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
-        rest = starts(start, len(static))
-        return xch_stems(static, dynamic, np.asarray(values, dtype=float), rest)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -12,10 +13,8 @@ from stiction_ros.effects.behaviour import (
     Filter,
     FloatArray,
     Memory,
-    Start,
     elapsed,
     parameter,
-    starts,
 )
 from stiction_ros.effects.seen import Seen
 
@@ -40,6 +39,7 @@ class Leak(Behaviour):
     places: ClassVar[tuple[str, ...]] = ("process",)
     experiment: ClassVar[str] = "move the set-point and hold it for several times the leak's time"
     absorbed: ClassVar[bool] = True
+    kernel: ClassVar[str] = "leaking"
 
     rate: float = parameter("rate", "1/s", "share λ that is lost per second", low=0.0)
 
@@ -57,13 +57,8 @@ class Leak(Behaviour):
         return (out, value, time), out
 
     @classmethod
-    def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
-    ) -> FloatArray:
-        from stiction_ros.effects.grid_kernels import leaking  # compiled: slow to import
-
-        keep = np.exp(-grid[:, 0] * sample_time)
-        return leaking(keep, np.asarray(values, dtype=float), starts(start, len(keep)))
+    def kernel_figures(cls, grid: FloatArray, sample_time: float) -> Sequence[FloatArray]:
+        return [np.exp(-grid[:, 0] * sample_time)]
 
     def filter(self, sample_time: float) -> Filter:
         """Return the leak with z_k = e^{−λT} y_{k−1} − x_{k−1}."""

@@ -3,16 +3,18 @@
 import dataclasses
 from typing import ClassVar
 
-from stiction_ros.effects.behaviour import parameter
-from stiction_ros.effects.limits import Limits
+from stiction_ros.effects.behaviour import Behaviour, parameter
+from stiction_ros.effects.valve.saturation import Saturation
 
 
 @dataclasses.dataclass(frozen=True)
-class Clip(Limits):
+class Clip(Saturation):
     """A sensor that shows nothing below ``low`` and above ``high``."""
 
     effect: ClassVar[str] = "clip"
     places: ClassVar[tuple[str, ...]] = ("sensor",)
+    experiment: ClassVar[str] = Behaviour.experiment
+    bends: ClassVar[bool] = False
     in_values: ClassVar[bool] = True
     not_searched: ClassVar[str] = "the values of PV show it, which are looked at first"
 

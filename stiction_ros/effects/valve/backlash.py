@@ -1,11 +1,10 @@
 """Backlash: the play between actuator and stem."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import ClassVar
 
-import numpy as np
-
-from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, Start, parameter, starts
+from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, parameter
 from stiction_ros.effects.seen import Seen
 
 
@@ -29,6 +28,7 @@ class Backlash(Behaviour):
     )
     family: ClassVar[str] = "friction"
     least: ClassVar[float] = 0.1  # %
+    kernel: ClassVar[str] = "playing"
 
     band: float = parameter("band", "%", "travel of OP that is lost at a reversal", low=0.0)
 
@@ -43,10 +43,5 @@ class Backlash(Behaviour):
         return stem, stem
 
     @classmethod
-    def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
-    ) -> FloatArray:
-        from stiction_ros.effects.grid_kernels import playing  # compiled: slow to import
-
-        half = grid[:, 0] / 2.0
-        return playing(half, np.asarray(values, dtype=float), starts(start, len(half)))
+    def kernel_figures(cls, grid: FloatArray, sample_time: float) -> Sequence[FloatArray]:
+        return [grid[:, 0] / 2.0]

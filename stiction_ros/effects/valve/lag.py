@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -12,10 +13,8 @@ from stiction_ros.effects.behaviour import (
     Filter,
     FloatArray,
     Memory,
-    Start,
     elapsed,
     parameter,
-    starts,
 )
 from stiction_ros.effects.seen import Seen
 
@@ -40,6 +39,7 @@ class Lag(Behaviour):
     )
     family: ClassVar[str] = "lag"
     absorbed: ClassVar[bool] = True
+    kernel: ClassVar[str] = "lagged"
 
     time_constant: float = parameter("tau", "s", "time constant τ", low=0.0)
 
@@ -58,13 +58,8 @@ class Lag(Behaviour):
         return (out, time), out
 
     @classmethod
-    def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
-    ) -> FloatArray:
-        from stiction_ros.effects.grid_kernels import lagged  # compiled: slow to import
-
-        share = np.array([-math.expm1(-_ratio(sample_time, tau)) for tau in grid[:, 0].tolist()])
-        return lagged(share, np.asarray(values, dtype=float), starts(start, len(share)))
+    def kernel_figures(cls, grid: FloatArray, sample_time: float) -> Sequence[FloatArray]:
+        return [np.array([-math.expm1(-_ratio(sample_time, tau)) for tau in grid[:, 0].tolist()])]
 
     def filter(self, sample_time: float) -> Filter:
         """Return the lag with z_k = y_{k−1}."""

@@ -1,19 +1,16 @@
 """Slew: an actuator whose speed is limited."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import ClassVar
-
-import numpy as np
 
 from stiction_ros.effects.behaviour import (
     NO_SAMPLE,
     Behaviour,
     FloatArray,
     Memory,
-    Start,
     elapsed,
     parameter,
-    starts,
 )
 from stiction_ros.effects.seen import Seen
 
@@ -32,6 +29,7 @@ class Slew(Behaviour):
     effect: ClassVar[str] = "slew"
     places: ClassVar[tuple[str, ...]] = ("valve",)
     experiment: ClassVar[str] = "move the set-point so far that OP moves fast"
+    kernel: ClassVar[str] = "slewing"
 
     rate: float = parameter("rate", "%/s", "largest speed of the stem", low=0.0)
 
@@ -50,10 +48,5 @@ class Slew(Behaviour):
         return (stem, time), stem
 
     @classmethod
-    def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: Start, sample_time: float = 1.0
-    ) -> FloatArray:
-        from stiction_ros.effects.grid_kernels import slewing  # compiled: slow to import
-
-        reach = grid[:, 0] * sample_time
-        return slewing(reach, np.asarray(values, dtype=float), starts(start, len(reach)))
+    def kernel_figures(cls, grid: FloatArray, sample_time: float) -> Sequence[FloatArray]:
+        return [grid[:, 0] * sample_time]

@@ -5,7 +5,6 @@ import math
 import re
 from collections import Counter
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +30,6 @@ _UNIT = re.compile(
 """A number and its unit in one cell."""
 
 _COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
-
-
-class Wrong(NamedTuple):
-    """The first cell of a column that is no number: its row, and such as ``is empty``."""
-
-    row: int
-    said: str
 
 
 def number(cell: str) -> float | None:
@@ -66,7 +58,6 @@ class Numbers:
     """A column of numbers as it grows."""
 
     decimal_comma: bool  # whether a lone comma in a number is decimal, and sets no thousands apart
-    wrong: Wrong | None = None  # first cell that is no finite number, None for none
     # what stood in the place of numbers, with its count; empty cells as ``''``
     words: Counter[str] = dataclasses.field(default_factory=Counter)
     _pieces: list[FloatArray] = dataclasses.field(default_factory=list)
@@ -84,8 +75,6 @@ class Numbers:
             text = "" if of_numbers else str(cells[row]).strip()
             blank[row], values[row] = not text, math.nan
             self.words[text[:SHOWN]] += 1
-            if self.wrong is None:
-                self.wrong = Wrong(sum(map(len, self._pieces)) + row, self._said(text))
         self._pieces.append(values)
         self._blank.append(blank)
 
@@ -96,13 +85,6 @@ class Numbers:
     def blank(self) -> NDArray[np.bool_]:
         """Return which cells are empty, shape (N,)."""
         return np.concatenate([np.zeros(0, dtype=np.bool_), *self._blank])
-
-    def _said(self, text: str) -> str:
-        if not text:
-            return "is empty"
-        if self._number(text) is None:
-            return f"is {text[:SHOWN]!r}, not a number"
-        return f"is {text[:SHOWN]}, not a finite number"
 
     def _number(self, text: str) -> float | None:
         """Return the number in a cell, also in one that is written for people."""

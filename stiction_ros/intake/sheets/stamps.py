@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.intake.sheets.cells import SHOWN, Cells, Numbers, Wrong, is_number
+from stiction_ros.intake.sheets.cells import SHOWN, Cells, Numbers, is_number
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.words import by_word
 
@@ -64,6 +64,13 @@ class Clock(NamedTuple):
     zoned: bool = False  # whether its zone is known
     zone: str = ""  # whose local time it is, where that is not yet brought to UTC; else empty
     daily: bool = False  # whether it counts from midnight each day
+
+
+class Wrong(NamedTuple):
+    """The first cell that is no time: its row, and the cell, or what is said of it."""
+
+    row: int
+    said: str
 
 
 class Times(NamedTuple):

@@ -7,12 +7,10 @@ import io
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, cast
-
-import zstandard
+from typing import Any
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.storage.packed import ZSTD, unpacked
+from stiction_ros.records.storage.packed import opened
 
 GZIP, ZIP, PARQUET = b"\x1f\x8b", b"PK\x03\x04", b"PAR1"
 
@@ -70,44 +68,20 @@ def open_text(path: Path) -> Iterator[io.TextIOBase]:
         if first.startswith(start):
             raise InputError(what, fix=fix)
     try:
-        with _unpacked(path, first) as data:
+        with _opened(path, first) as data:
             buffered = io.BufferedReader(data, 1 << 20)
             encoding = _encoding(buffered.peek(HEAD)[:HEAD])
             yield io.TextIOWrapper(
                 buffered, encoding=encoding, errors="stiction_western", newline=""
             )
-    except (EOFError, zlib.error, zstandard.ZstdError, gzip.BadGzipFile):
+    except (EOFError, zlib.error, gzip.BadGzipFile):
         raise InputError("is cut off or damaged", fix="pack or copy it anew") from None
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror or error})") from None
 
 
-def _unpacked(path: Path, first: bytes) -> io.RawIOBase:
-    if first.startswith(GZIP):
-        return cast(io.RawIOBase, gzip.open(path, "rb"))
-    return _Zstd(path) if first.startswith(ZSTD) else path.open("rb", buffering=0)
-
-
-class _Zstd(io.RawIOBase):
-    """Bytes of a file packed with Zstandard; one that is cut off is an EOFError."""
-
-    def __init__(self, path: Path) -> None:
-        self.file = path.open("rb")
-        self.blocks, self.ready = unpacked(self.file), b""
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        while not self.ready and (block := next(self.blocks, None)) is not None:
-            self.ready = block
-        count = min(len(buffer), len(self.ready))
-        buffer[:count], self.ready = self.ready[:count], self.ready[count:]
-        return count
-
-    def close(self) -> None:
-        self.file.close()
-        super().close()
+def _opened(path: Path, first: bytes) -> contextlib.AbstractContextManager[Any]:
+    return gzip.open(path, "rb") if first.startswith(GZIP) else opened(path)
 
 
 def _encoding(head: bytes) -> str:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.intake.sheets.cells import Wrong
 from stiction_ros.intake.sheets.names import Tag
 from stiction_ros.intake.sheets.stamps import Clock, Times
 from stiction_ros.records.record import QualityArray
@@ -37,7 +36,6 @@ class Column:
     name: str  # of its column or tag
     values: FloatArray  # shape (N,), NaN where there is no number; codes of words for a mode
     blank: FlagArray  # where nothing stood, shape (N,)
-    wrong: Wrong | None = None  # the first cell that is no number
     words: Counter[str] = dataclasses.field(default_factory=Counter)  # in the place of numbers
     unit: str = ""  # as the export says, empty when it does not
     known: tuple[str, ...] = ()  # words of a mode, by their codes

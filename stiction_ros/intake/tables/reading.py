@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import IntakeOptions
-from stiction_ros.intake.sheets.cells import Cells, Numbers, Words, Wrong
+from stiction_ros.intake.sheets.cells import Cells, Numbers, Words
 from stiction_ros.intake.sheets.names import read_tag, unit_in
 from stiction_ros.intake.sheets.sheet import Sheet
-from stiction_ros.intake.sheets.stamps import Clock, Stamps, Times
+from stiction_ros.intake.sheets.stamps import Clock, Stamps, Times, Wrong
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, in_seconds
 from stiction_ros.intake.tables.plan import OneValue, Plan
@@ -65,7 +65,7 @@ def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[
                 said += own
                 unit = sheet.layout.units[index] or unit_in(given)
                 read = numbers[index]
-                column = Column(given, read.values(), read.blank(), read.wrong, read.words, unit)
+                column = Column(given, read.values(), read.blank(), read.words, unit)
                 column = _without_bad(column, bad)
             same = next((k for k, other in enumerate(blocks) if other.has_times(time)), None)
             if same is None:
@@ -109,9 +109,6 @@ def _long(
             column = _mode(name, modes)
         else:
             column = Column(name, numbers[rows], blank[rows], words=Counter(filter(None, said)))
-            if column.words or column.blank.any():
-                row = int(np.argmax(~np.isfinite(column.values)))
-                column.wrong = Wrong(row, f"is {said[row]!r}, not a number")
             column = _without_bad(column, None if bad is None else bad[rows])
         unit = unit_words[unit_of[code]].strip() if code in unit_of else ""
         column.unit = unit or unit_in(name)

@@ -5,7 +5,6 @@ A plan begins with the valve at rest, so what a moving stem would go on by itsel
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -14,8 +13,6 @@ from stiction_ros.control.horizon_qp import slack_weights
 from stiction_ros.control.target import Target
 from stiction_ros.effects import HeStiction, KanoStiction, XchStiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
-from stiction_ros.effects.friction.he_smoothed import smoothed_step
-from stiction_ros.effects.friction.kano_smoothed import kano_step
 from stiction_ros.errors import InputError
 from stiction_ros.paper.controllers.weights import AugmentedWeights
 from stiction_ros.processes import LinearModel
@@ -35,30 +32,6 @@ def printed_frictions(frictions: Sequence[Behaviour | None]) -> tuple[PrintedFri
             )
         known.append(friction)
     return tuple(known)
-
-
-def directed(friction: PrintedFriction) -> bool:
-    """Return whether the law remembers which way the stem moves."""
-    return not isinstance(friction, HeStiction)
-
-
-def smoothed_stem(
-    friction: PrintedFriction,
-    before: tuple[Any, Any, Any],
-    op: Any,
-    figures: tuple[Any, Any, Any],
-    tanh: Any,
-) -> tuple[Any, Any]:
-    """Return the next stem and direction of motion by the smoothed law of ``friction``.
-
-    ``before`` are stem, OP and direction one sample ago, ``figures`` f_S, f_D and τ; all are
-    numbers or CasADi expressions, as ``tanh`` takes them.
-    """
-    if directed(friction):
-        found: tuple[Any, Any] = kano_step(before, op, figures, tanh)
-        return found
-    static, dynamic, smoothing = figures
-    return smoothed_step(before[0], op, (static, dynamic), smoothing, tanh), before[2]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,12 +8,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.paper.controllers.augmented_cost import (
-    PlanProblem,
-    PrintedFriction,
-    directed,
-    smoothed_stem,
-)
+from stiction_ros.paper.controllers.augmented_cost import PlanProblem, PrintedFriction
 from stiction_ros.paper.controllers.weights import PaperTuning
 from stiction_ros.processes import LinearModel
 
@@ -73,13 +68,15 @@ class SmoothedProgramme:
         soft: SoftOutputs | None = None,
     ) -> None:
         """Build, for ``frictions`` with None for a healthy valve and ``limits``, (m, 2), %."""
+        from stiction_ros.paper.smoothed_laws import smooth_law  # compiled: slow to import
+
         self.model, self.tuning, self._soft = model, tuning, soft
         self._sticky = [j for j, friction in enumerate(frictions) if friction is not None]
         pairs = [friction for friction in frictions if friction is not None]
         self._friction = np.array([(f.static_friction, f.dynamic_friction) for f in pairs])
         horizon, m, n = tuning.weights.horizon, len(model.stem0), model.order
-        self._laws = pairs
-        self._directed = [row for row, friction in enumerate(pairs) if directed(friction)]
+        self._laws = [smooth_law(str(friction.law)) for friction in pairs]
+        self._directed = [row for row, law in enumerate(self._laws) if law.states > 1]
         self._shape = (horizon, m + len(self._sticky) + len(self._directed) + n)
         open_end = np.full((n, 2), [-np.inf, np.inf])
         turns = np.full((len(self._directed), 2), [-1.0, 1.0])
@@ -108,15 +105,16 @@ class SmoothedProgramme:
             unknowns += [op, stuck, turn, after]
             moved = casadi.SX(op)
             for row, j in enumerate(sticky):
-                figures = friction[row, 0], friction[row, 1], self.tuning.smoothing
-                memory = stem[j], last[j], ways[row]
-                law = self._laws[row]
-                follows, way = smoothed_stem(law, memory, op[j], figures, casadi.tanh)
+                figures = friction[row, 0], friction[row, 1]
+                law, memory = self._laws[row], [stem[j], ways[row]]
+                follows, *way = law.step(
+                    memory, (op[j], last[j]), figures, self.tuning.smoothing, casadi.tanh
+                )
                 residuals.append(follows - stuck[row])
                 moved[j] = stuck[row]
                 if row in self._directed:
                     ways[row] = turn[self._directed.index(row)]
-                    residuals.append(way - ways[row])
+                    residuals.append(way[0] - ways[row])
             drive = casadi.mtimes(model.b, moved - goal)
             residuals.append(casadi.mtimes(model.a, state) + drive - after)
             cost += _square(stem - goal, weights.stem) + _square(state, weights.state)

@@ -54,11 +54,6 @@ class Solution:
     feasible: bool  # whether all constraints hold
     stable: bool  # whether every identified A(q) has its roots inside the unit circle
 
-    @property
-    def accepted(self) -> bool:
-        """Whether it may win: finite, feasible and stable."""
-        return self.feasible and self.stable and bool(np.isfinite(self.objective))
-
 
 class FrictionProgramme:
     """Problem (12) for given delays; one solver serves every start."""

@@ -11,9 +11,8 @@ of T choices of delays are spent:
 The best objective of a stable process wins.
 """
 
-import dataclasses
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -54,23 +53,6 @@ APART = 0.05  # of f_max: starts and ends nearer than that are one place
 Progress = Callable[[float], None]
 
 
-@dataclasses.dataclass(frozen=True)
-class _End:
-    """Where one run came to."""
-
-    delays: Delays
-    solution: ReducedSolution
-    stable: bool
-
-    @property
-    def accepted(self) -> bool:
-        return self.solution.feasible and self.stable
-
-    @property
-    def objective(self) -> float:
-        return self.solution.objective if self.accepted else float("inf")
-
-
 def identify_by_programme(
     record: Record, options: PaperOptions | None = None, progress: Progress | None = None
 ) -> PaperIdentification:
@@ -84,9 +66,9 @@ def identify_by_programme(
     best = search.run()
     answer = one_step.Answer(
         "" if best else NO_END,
-        best.solution.friction if best else np.zeros((len(record.valves), 2)),
+        np.array(best.end) if best else np.zeros((len(record.valves), 2)),
         best.delays if best else search.choices[0],
-        best.solution.objective if best else None,
+        best.objective if best else None,
         sum(one.criterion.evaluations for one in search.programmes.values()),
         starts=tuple(search.log),
     )
@@ -105,20 +87,19 @@ class _Search:
         }
         self.budget = options.starts * len(self.choices)
         self.log: list[SolvedStart] = []
-        self.ends: list[_End] = []
         self._tried: dict[Delays, list[FloatArray]] = {delays: [] for delays in self.choices}
         self._ranked = self._rank()
 
-    def run(self) -> _End | None:
+    def run(self) -> SolvedStart | None:
         """Return the best end, or None where no run ended feasible."""
         each = max(1, self.budget // OPENING // len(self.choices))
         for delays in self.choices:
             for _ in range(each):
                 self._open(delays)
         onward: Iterator[tuple[Start, Delays, float]] = iter(())
-        begun_from: _End | None = None
+        begun_from: SolvedStart | None = None
         while len(self.log) < self.budget:
-            best = self._best()
+            best = best_of(self.log)
             if best is None:
                 self._open(self.choices[len(self.log) % len(self.choices)])
                 continue
@@ -130,7 +111,7 @@ class _Search:
             if len(self.log) < self.budget:
                 self._open(best.delays)
         self.progress(1.0)
-        return self._best()
+        return best_of(self.log)
 
     def _rank(self) -> dict[Delays, list[Start]]:
         """Return all candidates, the best first, for each choice of delays."""
@@ -154,9 +135,9 @@ class _Search:
         reach = APART * self.table.limits
         return any((np.abs(place - friction).max(axis=1) < reach).all() for place in places)
 
-    def _onward(self, best: _End) -> Iterator[tuple[Start, Delays, float]]:
+    def _onward(self, best: SolvedStart) -> Iterator[tuple[Start, Delays, float]]:
         """Yield ways to go on from an end: nearer, a valve released, farther, other delays."""
-        friction, criterion = best.solution.friction, self.programmes[best.delays].criterion
+        friction, criterion = np.array(best.end), self.programmes[best.delays].criterion
         for reach in (AROUND, NEARER * AROUND):
             near = [friction, *around(friction, self.table.limits, reach, POINTS_AROUND)]
             first = min(near, key=lambda point: criterion(point)[0])
@@ -178,20 +159,7 @@ class _Search:
         fits = one_step.evaluated(self.record, self.options, solution.friction, delays).fits
         stable = max(fit.largest_root for fit in fits) < 1.0
         self._tried[delays] += [start.friction, solution.friction]
-        self.ends.append(_End(delays, solution, stable))
-        self.log.append(
-            SolvedStart(
-                kind=start.kind.value,
-                delays=delays,
-                start=pairs(start.friction),
-                end=pairs(solution.friction),
-                objective=solution.objective,
-                status=solution.status,
-                iterations=solution.iterations,
-                feasible=solution.feasible,
-                stable=stable,
-            )
-        )
+        self.log.append(solved(start, delays, solution, stable))
         self.progress(min(1.0, len(self.log) / self.budget))
 
     def _released(self, start: Start, criterion: Criterion) -> Start:
@@ -204,14 +172,32 @@ class _Search:
                 friction = released
         return Start(start.kind, friction)
 
-    def _best(self) -> _End | None:
-        accepted = [end for end in self.ends if end.accepted]
-        return min(accepted, key=lambda end: end.objective) if accepted else None
+
+def solved(
+    start: Start, delays: Delays, end: ReducedSolution | Solution, stable: bool
+) -> SolvedStart:
+    """Return what one run of IPOPT came to, in plain numbers."""
+    begun, ended = (
+        tuple((float(static), float(dynamic)) for static, dynamic in friction)
+        for friction in (start.friction, end.friction)
+    )
+    return SolvedStart(
+        kind=start.kind.value,
+        delays=delays,
+        start=begun,
+        end=ended,
+        objective=end.objective,
+        status=end.status,
+        iterations=end.iterations,
+        feasible=end.feasible,
+        stable=stable,
+    )
 
 
-def pairs(friction: FloatArray) -> tuple[tuple[float, float], ...]:
-    """Return frictions of shape (m, 2) as plain numbers."""
-    return tuple((float(static), float(dynamic)) for static, dynamic in friction)
+def best_of(log: Sequence[SolvedStart]) -> SolvedStart | None:
+    """Return the run of least (12a) that may win; None where none may."""
+    accepted = [one for one in log if one.accepted]
+    return min(accepted, key=lambda one: one.objective, default=None)
 
 
 def identify_as_printed(
@@ -231,31 +217,22 @@ def identify_as_printed(
     starts = draw_starts(limits, stictions, options.starts)
     smoothing = final_smoothing(limits)
     data = ProgrammeData.of(record.op, record.pv, limits, orders, options.law)
-    ends: list[tuple[Delays, Solution]] = []
     log: list[SolvedStart] = []
     for delays in choices:
         programme = FrictionProgramme(data, delays)
         for start in starts:
             end = programme.solve(programme.start(start.friction), smoothing)
-            ends.append((delays, end))
-            log.append(
-                SolvedStart(
-                    kind=start.kind.value,
-                    delays=delays,
-                    start=pairs(start.friction),
-                    end=pairs(end.friction),
-                    objective=end.objective,
-                    status=end.status,
-                    iterations=end.iterations,
-                    feasible=end.feasible,
-                    stable=end.stable,
-                )
-            )
+            log.append(solved(start, delays, end, end.stable))
             if progress is not None:
-                progress(len(ends) / (len(choices) * len(starts)))
-    accepted = [one for one in ends if one[1].accepted]
-    delays, best = min(accepted or ends, key=lambda one: one[1].objective)
-    friction = best.friction if accepted else np.zeros((len(limits), 2))
-    reason = "" if accepted else NO_END
-    answer = one_step.Answer(reason, friction, delays, best.objective, len(ends), starts=tuple(log))
+                progress(len(log) / (len(choices) * len(starts)))
+    accepted = best_of(log)
+    best = accepted or min(log, key=lambda one: one.objective)
+    answer = one_step.Answer(
+        "" if accepted else NO_END,
+        np.array(best.end) if accepted else np.zeros((len(limits), 2)),
+        best.delays,
+        best.objective,
+        len(log),
+        starts=tuple(log),
+    )
     return one_step.result(record, options, answer, time.perf_counter() - begun)

@@ -57,7 +57,6 @@ class StemTable:
         limits: f_max per valve, shape (m,), %.
         orders: n_a, n_b, ε.
         law: of the valves.
-        made: stems that were simulated.
     """
 
     def __init__(
@@ -65,7 +64,6 @@ class StemTable:
     ) -> None:
         self.record, self.limits, self.orders = record, limits, orders
         self.law = smooth_law(law)
-        self.made = 0
         self._smoothing = final_smoothing(limits)
         self._kept: dict[bytes, FloatArray] = {}
 
@@ -74,7 +72,6 @@ class StemTable:
         key = np.round(friction, 9).tobytes()
         found = self._kept.get(key)
         if found is None:
-            self.made += 1
             if len(self._kept) >= KEPT:
                 self._kept.clear()
             found = self.law.stems(self.record.op, friction, self._smoothing)

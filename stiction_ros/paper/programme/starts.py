@@ -126,13 +126,13 @@ class Start:
     friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
 
 
-def border(limit: float, step: float = STEP) -> FloatArray:
+def border(limit: float) -> FloatArray:
     """Return the border of 0 ≤ f_D ≤ f_S ≤ limit in steps, shape (n, 2), %.
 
     From (0, 0) along f_D = 0 to (limit, 0), up to (limit, limit), and back along f_D = f_S.
     A triangle smaller than four steps is walked in quarters of its side.
     """
-    step = min(step, limit / 4.0)
+    step = min(STEP, limit / 4.0)
     nodes = np.append(np.arange(0.0, limit - 1e-9 * limit, step), limit)
     rows = [(value, 0.0) for value in nodes]
     rows += [(limit, value) for value in nodes[1:]]

@@ -3,8 +3,9 @@
 import dataclasses
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from mcap.writer import CompressionType, Writer
 
@@ -39,16 +40,11 @@ class Packing:
             )
 
 
-@dataclasses.dataclass(frozen=True)
-class FileContent:
-    """What one storage file holds."""
+class FileContent(NamedTuple):
+    """One storage file: its name, counts and times, and the scan of all of it."""
 
-    file: metadata.BagFile  # its name, counts and times
-    topics: tuple[metadata.BagTopic, ...]  # in the order they were announced
-    run: Mapping[str, str]  # what its metadata records say of the run
-    finished: bool  # whether its writer closed it
-    damaged: bool  # whether something in it is broken
-    notes: tuple[str, ...]  # what was left out, one sentence each
+    file: metadata.BagFile
+    scan: McapScan
 
 
 def storage_path(directory: Path, number: int = 0) -> Path:
@@ -75,7 +71,7 @@ def finish_bag(directory: str | Path, packing: Packing = Packing()) -> tuple[str
     caps = log_time_caps(files)
     contents = [rewrite(file, packing, cap=cap) for file, cap in zip(files, caps, strict=True)]
     write_listing(directory, contents)
-    return tuple(note for content in contents for note in content.notes)
+    return tuple(note for content in contents for note in content.scan.notes)
 
 
 def log_time_caps(files: Sequence[Path]) -> list[int | None]:
@@ -101,7 +97,7 @@ def _caps(files: int, number: int, first: int) -> list[int | None]:
 
 
 def rewrite(
-    path: Path, packing: Packing, *, cap: int | None = None, salvage: bool = False
+    path: Path, packing: Packing = Packing(), *, cap: int | None = None, salvage: bool = False
 ) -> FileContent:
     """Rewrite one file chunked and indexed, in its place.
 
@@ -120,9 +116,9 @@ def rewrite(
                 enable_data_crcs=True,
             )
             target.start("ros2", "stiction_ros")
-            content = content_of(_copy(scan, target, cap), scan)
-            if content.run:
-                target.add_metadata(RUN, dict(content.run))
+            content = FileContent(_copy(scan, target, cap), scan)
+            if run := merged(scan.metadata):
+                target.add_metadata(RUN, run)
             for name, mapping in scan.metadata:
                 if name not in (RUN, ROSBAG2):
                     target.add_metadata(name, mapping)
@@ -184,19 +180,12 @@ def _copy(scan: McapScan, target: Writer, cap: int | None) -> metadata.BagFile:
     return metadata.BagFile(scan.path.name, counts, first, last)
 
 
-def content_of(file: metadata.BagFile, scan: McapScan) -> FileContent:
-    """Return what a file holds after a scan of all its messages."""
-    topics = tuple(scan.topics.values())
-    run = merged(scan.metadata)
-    return FileContent(file, topics, run, scan.finished, scan.damaged, tuple(scan.notes))
-
-
 def _information(contents: Sequence[FileContent]) -> dict[str, object]:
     topics: dict[str, metadata.BagTopic] = {}
     run: dict[str, str] = {}
-    for content in contents:
-        run.update(content.run)
-        for topic in content.topics:
+    for _, scan in contents:
+        run.update(merged(scan.metadata))
+        for topic in scan.topics.values():
             topics.setdefault(topic.name, topic)
     files = [content.file for content in contents]
     return metadata.bag_information(files, list(topics.values()), custom=custom_data(run))

@@ -46,8 +46,7 @@ def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMe
     for file in storage_files(path):
         scan = McapScan(file)
         yield from _by_log_time(scan)
-        for channel, count in scan.counts.items():
-            counts[scan.topics[channel].name] += count
+        counts += scan.counts
         if notes is not None:
             notes.extend(scan.notes)
     if notes is not None:

@@ -11,16 +11,11 @@ import yaml
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import read_raw
-from stiction_ros.records.storage.bag_metadata import BagTopic, Qos
+from stiction_ros.records.storage.bag_metadata import QOS_WORDS, BagTopic, Qos
 from stiction_ros.records.storage.mcap_scan import RawMessage
 
 SECOND = 10**9
-# Numbers of rmw's enumerations, as bags before version 9 write them.
-_NUMBERED = {
-    "history": ("system_default", "keep_last", "keep_all", "unknown"),
-    "reliability": ("system_default", "reliable", "best_effort", "unknown", "best_available"),
-    "durability": ("system_default", "transient_local", "volatile", "unknown", "best_available"),
-}
+KEPT = ("history", "reliability", "durability")  # of a recorded profile, beside its depth
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,8 +65,9 @@ def offered_qos(topic: BagTopic) -> Qos:
     try:
         profiles = [
             {
-                key: value.lower() if isinstance(value, str) else words[int(str(value))]
-                for key, words in _NUMBERED.items()
+                # bags before version 9 write the numbers of rmw
+                key: value.lower() if isinstance(value, str) else QOS_WORDS[key][int(str(value))]
+                for key in KEPT
                 for value in (profile.get(key, 0),)
             }
             | {"depth": int(profile.get("depth", 0))}
@@ -81,7 +77,7 @@ def offered_qos(topic: BagTopic) -> Qos:
         raise InputError(
             f"the quality of service of {topic.name} cannot be read", where="offered_qos_profiles"
         ) from None
-    said = {key: {str(profile[key]) for profile in profiles} for key in _NUMBERED}
+    said = {key: {str(profile[key]) for profile in profiles} for key in KEPT}
     best_effort = bool(profiles) and said["reliability"] == {"best_effort"}
     latched = "transient_local" in said["durability"]
     keep_all = "keep_all" in said["history"]

@@ -4,12 +4,11 @@ import dataclasses
 import enum
 import shlex
 import shutil
-from collections import Counter
 from pathlib import Path
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag import finish
-from stiction_ros.records.storage.bag_metadata import BagFile
+from stiction_ros.records.storage.bag_metadata import BagFile, joined
 from stiction_ros.records.storage.files import METADATA, found_files, listing_notes, refuse_foreign
 from stiction_ros.records.storage.mcap_scan import McapScan
 from stiction_ros.records.storage.packed import SUFFIXES
@@ -35,7 +34,7 @@ class Repair:
     notes: tuple[str, ...]  # what was wrong, one sentence each
 
 
-def repair_bag(path: str | Path, packing: finish.Packing = finish.Packing()) -> Repair:  # noqa: B008 (frozen)
+def repair_bag(path: str | Path) -> Repair:
     """Repair a bag, a rosbag2 directory or one ``.mcap`` file, in its place.
 
     A file that was damaged is kept beside the new one, as ``….mcap.damaged``. What the bag
@@ -55,38 +54,32 @@ def repair_bag(path: str | Path, packing: finish.Packing = finish.Packing()) -> 
         raise InputError("is packed", where=str(path), fix=fix)
     files = found_files(path) if path.is_dir() else (path,)
     contents = [_look(file) for file in files]
-    notes = [note for content in contents for note in content.notes]
-    ill = [content.damaged or not content.finished for content in contents]
+    scans = [content.scan for content in contents]
+    notes = [note for scan in scans for note in scan.notes]
+    ill = [scan.damaged or not scan.finished for scan in scans]
     caps = finish.log_time_caps(files) if any(ill) else [None] * len(files)
     for number, file in enumerate(files):
-        if contents[number].damaged:
+        if scans[number].damaged:
             shutil.copy2(file, file.with_suffix(".mcap.damaged"))
         if ill[number]:
-            contents[number] = finish.rewrite(file, packing, cap=caps[number], salvage=True)
+            contents[number] = finish.rewrite(file, cap=caps[number], salvage=True)
     listing = _listing_faults(path, contents)
     if path.is_dir() and (any(ill) or listing):
         finish.write_listing(path, contents)
     status = RepairStatus.FINISHED if any(ill) or listing else RepairStatus.WHOLE
-    if any(content.damaged for content in contents):
+    if any(scan.damaged for scan in scans):
         status = RepairStatus.SALVAGED
-    return Repair(
-        status, tuple(file.name for file in files), dict(_counts(contents)), (*notes, *listing)
-    )
+    whole = joined([content.file for content in contents])
+    names = tuple(file.name for file in files)
+    return Repair(status, names, dict(whole.counts), (*notes, *listing))
 
 
 def _look(path: Path) -> finish.FileContent:
     """Return what a file holds, damaged or not."""
     scan = McapScan(path, salvage=True)
-    first: int | None = None
-    last: int | None = None
-    for message in scan.messages():
-        time = message.log_time
-        first = time if first is None else min(first, time)
-        last = time if last is None else max(last, time)
-    counts: Counter[str] = Counter()
-    for channel, topic in scan.topics.items():
-        counts[topic.name] += scan.counts[channel]
-    return finish.content_of(BagFile(path.name, dict(counts), first, last), scan)
+    times = [message.log_time for message in scan.messages()]
+    first, last = min(times, default=None), max(times, default=None)
+    return finish.FileContent(BagFile(path.name, scan.counts, first, last), scan)
 
 
 def _listing_faults(path: Path, contents: list[finish.FileContent]) -> list[str]:
@@ -96,13 +89,6 @@ def _listing_faults(path: Path, contents: list[finish.FileContent]) -> list[str]
     if not (path / METADATA).is_file():
         return [f"{METADATA} is missing"]
     try:
-        return listing_notes(path, _counts(contents))
+        return listing_notes(path, joined([content.file for content in contents]).counts)
     except InputError as error:
         return [str(error)]
-
-
-def _counts(contents: list[finish.FileContent]) -> Counter[str]:
-    counts: Counter[str] = Counter()
-    for content in contents:
-        counts.update(content.file.counts)
-    return counts

@@ -31,7 +31,6 @@ class LoopSignals:
     def __init__(self, where: str) -> None:
         self._where = where
         self._given: dict[tuple[str, str], list[Given]] = {}
-        self._tags: dict[tuple[str, str], Counter[tuple[str, ...]]] = {}
         self._bad: dict[tuple[str, str], Counter[str]] = {}
 
     def add(self, message: BagMessage, number: int) -> None:
@@ -50,14 +49,12 @@ class LoopSignals:
         if wrong:
             self._bad.setdefault(key, Counter())[wrong] += 1
             return
-        tags = tuple(str(name) for name in names)
-        self._tags.setdefault(key, Counter())[tags] += 1
-        given = Given(number, stamp, dict(zip(tags, values, strict=True)))
+        given = Given(number, stamp, dict(zip(map(str, names), values, strict=True)))
         self._given[key].append(given)
 
     def tags(self, space: str, signal: str) -> tuple[str, ...]:
         """Return the tags that most messages of a signal bear; empty without a usable one."""
-        found = self._tags.get((space, signal))
+        found = Counter(tuple(given.values) for given in self._given.get((space, signal), ()))
         return found.most_common(1)[0][0] if found else ()
 
     def given(self, space: str, signal: str, tags: tuple[str, ...]) -> list[Given]:

@@ -12,12 +12,13 @@ from stiction_ros.errors import InputError
 VERSION = 9  # version of ``metadata.yaml``: QoS is a list of mappings with enums as words
 INFINITE_NS = 2**63 - 1  # nanoseconds by which ROS writes an infinite duration
 
-_WORDS = {
+QOS_WORDS = {
     "history": ("system_default", "keep_last", "keep_all", "unknown"),
-    "reliability": ("system_default", "reliable", "best_effort", "best_available", "unknown"),
-    "durability": ("system_default", "transient_local", "volatile", "best_available", "unknown"),
-    "liveliness": ("system_default", "automatic", "manual_by_topic", "best_available", "unknown"),
+    "reliability": ("system_default", "reliable", "best_effort", "unknown", "best_available"),
+    "durability": ("system_default", "transient_local", "volatile", "unknown", "best_available"),
+    "liveliness": ("system_default", "automatic", "manual_by_topic", "unknown", "best_available"),
 }
+"""Words of ROS; those of the first three in the order of the numbers that rmw gives them."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Qos:
     avoid_ros_namespace_conventions: bool = False  # as in ROS
 
     def __post_init__(self) -> None:
-        for key, words in _WORDS.items():
+        for key, words in QOS_WORDS.items():
             word = getattr(self, key)
             if word not in words:
                 raise InputError(

@@ -6,6 +6,7 @@ Unlike the readers of ``mcap`` it gives back complete messages only and compares
 import os
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -49,7 +50,7 @@ class McapScan:
 
     Attributes:
         topics: channel id to topic, filled as :meth:`messages` goes on.
-        counts: messages by channel id, as far as :meth:`messages` has come.
+        counts: messages by topic name, as far as :meth:`messages` has come.
         metadata: name and content of every metadata record met so far.
         chunked: whether a chunk was met.
         finished: whether it ends as a finished file does; False for a file whose writer
@@ -61,7 +62,7 @@ class McapScan:
     def __init__(self, path: Path, *, salvage: bool = False) -> None:
         self.path = path
         self.topics: dict[int, BagTopic] = {}
-        self.counts: dict[int, int] = {}
+        self.counts: Counter[str] = Counter()
         self.metadata: list[tuple[str, dict[str, str]]] = []
         self.chunked = self.finished = self.damaged = False
         self.notes: list[str] = []
@@ -141,7 +142,7 @@ class McapScan:
                 topic = self.topics.get(record.channel_id)
                 if topic is None:
                     raise ValueError(f"a message of channel {record.channel_id} that is not known")
-                self.counts[record.channel_id] += 1
+                self.counts[topic.name] += 1
                 found.append(RawMessage(topic, record.log_time, record.publish_time, record.data))
             elif isinstance(record, mcap_records.Metadata):
                 self.metadata.append((record.name, record.metadata))
@@ -155,7 +156,7 @@ class McapScan:
                 self._schemas[record.id] = record
             elif isinstance(record, mcap_records.Channel):
                 schema = self._schemas.get(record.schema_id, mcap_records.Schema(0, b"", "", ""))
-                self.counts.setdefault(record.id, 0)
+                self.counts[record.topic] += 0
                 self.topics[record.id] = BagTopic(
                     name=record.topic,
                     type=schema.name,
@@ -177,7 +178,7 @@ class McapScan:
         if expected not in (0, checksum):
             self._broken(place, "the checksum of the data is wrong")
             return
-        found, fault = sum(self.counts.values()), ""
+        found, fault = self.counts.total(), ""
         try:
             summary = _summary(rest)
             self._learn(summary)

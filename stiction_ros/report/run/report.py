@@ -348,7 +348,6 @@ def report_run(
     *,
     scenario: Scenario | None = None,
     seconds: float | None = None,
-    load: float | None = None,
     namespace: str | None = None,
 ) -> RunReport:
     """Read a bag of a live loop and write ``summary.json`` and ``report.html``.
@@ -357,16 +356,14 @@ def report_run(
         bag: a rosbag2 directory or a ``.mcap`` file.
         out: folder, made when missing; or the ``.html`` file alone.
         scenario: that was run, for the comparison with a loop without friction.
-        seconds, load: wall time of the run, and of the machine before it, where known.
+        seconds: wall time of the run, where known.
         namespace: of the loop's topics, for a bag that holds several loops.
     """
     story = tell(read_run(bag, namespace=namespace), scenario=scenario)
-    return write_run(story, out, seconds, load)
+    return write_run(story, out, seconds)
 
 
-def write_run(
-    story: Story, out: str | Path, seconds: float | None = None, load: float | None = None
-) -> RunReport:
+def write_run(story: Story, out: str | Path, seconds: float | None = None) -> RunReport:
     """Write what :func:`report_run` writes of a run that has been scored."""
-    figures = summary(story, seconds, load)
+    figures = summary(story, seconds)
     return RunReport(figures, write_page(out, run_page(story), figures))

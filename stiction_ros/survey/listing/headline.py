@@ -1,10 +1,10 @@
-"""What a survey found in a sentence or two, alike on page and console."""
+"""What a survey found in a sentence or two, alike on page and console, beside earlier ones."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from stiction_ros.survey.entry import Entry, Status
-from stiction_ros.survey.pages.trend import Earlier, new_and_gone
 from stiction_ros.survey.pages.words import period, signed_percent
 from stiction_ros.survey.survey import Survey
 
@@ -32,6 +32,27 @@ WHY = (
 NOTHING = -0.005  # change from which up another tuning is none that helps
 
 
+@dataclasses.dataclass(frozen=True)
+class Earlier:
+    """An earlier survey: its date, ISO or empty, and f_S + f_D of its loops in the unit of OP."""
+
+    date: str
+    bands: Mapping[str, float | None]
+
+    @property
+    def day(self) -> str:
+        """Return its date without the time of day, or that it is earlier."""
+        return self.date[:10] or "earlier"
+
+
+def steps_of(entry: Entry, earlier: Sequence[Earlier]) -> list[tuple[str, float]]:
+    """Return when the band of a loop was how wide, the oldest first; none without earlier ones."""
+    steps = [(one.day, band) for one in earlier if (band := one.bands.get(entry.name)) is not None]
+    if steps and entry.f_s is not None and entry.f_d is not None:
+        steps.append(("now", entry.f_s + entry.f_d))
+    return steps
+
+
 def headline(survey: Survey) -> str:
     """Return how many valves are to be looked at, or that none could be judged."""
     count, judged = len(survey.entries), survey.judged
@@ -54,8 +75,11 @@ def worked(survey: Survey) -> str:
 
 def changed(entries: Sequence[Entry], earlier: Sequence[Earlier]) -> list[str]:
     """Return which loops are new and which are gone since the last survey, a sentence each."""
-    new, gone = new_and_gone(entries, earlier)
-    when = f" the survey of {earlier[-1].day}" if earlier and earlier[-1].date else " the last one"
+    if not earlier:
+        return []
+    now, before = {entry.name for entry in entries}, set(earlier[-1].bands)
+    new, gone = sorted(now - before), sorted(before - now)
+    when = f" the survey of {earlier[-1].day}" if earlier[-1].date else " the last one"
     told = [f"New since{when}: {_listed(new)}."] if new else []
     return told + ([f"Gone since{when}: {_listed(gone)}."] if gone else [])
 

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 from stiction_ros.pages.frame import SCROLLED, card, framed, text, words
 from stiction_ros.survey.entry import Entry
-from stiction_ros.survey.listing.columns import HINTS, Columns
-from stiction_ros.survey.listing.headline import changed, headline, kind_of, worked
-from stiction_ros.survey.pages.trend import Earlier
+from stiction_ros.survey.listing.columns import COST, Column, columns_of
+from stiction_ros.survey.listing.headline import Earlier, changed, headline, kind_of, worked
 from stiction_ros.survey.pages.words import cause_words, period
 from stiction_ros.survey.survey import Survey
 
@@ -51,7 +50,7 @@ def list_page(survey: Survey, earlier: Sequence[Earlier] = ()) -> str:
     """Return the page of a survey, with those before it, the oldest first."""
     entries = survey.entries
     first = headline(survey)
-    columns = Columns.of(entries, earlier)
+    columns = columns_of(entries, earlier)
     parts = [
         f"<h1>{text(first)}</h1>",
         f'<p class="soft">{text(_how(survey))}</p>',
@@ -96,19 +95,20 @@ def _tools(entries: Sequence[Entry]) -> str:
     )
 
 
-def _table(entries: Sequence[Entry], columns: Columns) -> str:
+def _table(entries: Sequence[Entry], columns: Sequence[Column]) -> str:
     head = [
-        f'<th class="{kind}" scope="col"><button type="button" title="{text(HINTS[label])}">'
-        f"{words(label)}</button></th>"
-        for kind, label in columns.heads
+        f'<th class="{column.kind}" scope="col"><button type="button" title="{text(column.hint)}">'
+        f"{words(column.head)}</button></th>"
+        for column in columns
     ]
     rows = []
     for entry in entries:
         cells = []
-        for (kind, label), (shown, value) in zip(columns.heads, columns.cells(entry), strict=True):
-            said = text(label.replace("_S", "ₛ"))
-            tag = 'th scope="row"' if label == "loop" else f'td data-label="{said}"'
-            kind += " none" * shown.endswith(">–</span>")
+        for column in columns:
+            shown, value = column.shown(entry)
+            said = text(column.head.replace("_S", "ₛ"))
+            tag = 'th scope="row"' if column.head == "loop" else f'td data-label="{said}"'
+            kind = column.kind + " none" * shown.endswith(">–</span>")
             cells.append(f'<{tag} class="{kind}" data-value="{text(value)}">{shown}</{tag[:2]}>')
         rows.append(
             f'<tr data-kind="{text(kind_of(entry))}" data-cause="{text(entry.cause or "")}">'
@@ -147,10 +147,11 @@ def _groups(survey: Survey) -> str:
     )
 
 
-def _legend(columns: Columns) -> str:
-    money = " A cost that was given counts too." if columns.costs else ""
+def _legend(columns: Sequence[Column]) -> str:
+    costs = any(column.head == COST for column in columns)
+    money = " A cost that was given counts too." if costs else ""
     hints = "".join(
-        f"<dt>{words(label)}</dt><dd>{words(HINTS[label])}</dd>" for _, label in columns.heads
+        f"<dt>{words(column.head)}</dt><dd>{words(column.hint)}</dd>" for column in columns
     )
     return (
         "<h2>How to read it</h2><p>Valves that stick or have backlash and make their loop cycle "

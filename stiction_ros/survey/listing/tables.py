@@ -1,11 +1,8 @@
 """The list as CSV and XLSX, for the maintenance system."""
 
 import csv
-import io
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.listing.headline import HEADS, change
@@ -14,36 +11,6 @@ from stiction_ros.survey.pages.words import cause_words
 Cell = str | float | int | None
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # how a formula of a spreadsheet begins
-STAMP = (1980, 1, 1, 0, 0, 0)  # time of the files inside the XLSX: the same list is the same file
-
-_TYPES = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
-<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
-<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
-<Default Extension="xml" ContentType="application/xml"/>
-<Override PartName="/xl/workbook.xml" ContentType=\
-"application/vnd.openxmlformats-officedocument.spreadsheetml.sheet.main+xml"/>
-<Override PartName="/xl/worksheets/sheet1.xml" ContentType=\
-"application/vnd.openxmlformats-officedocument.spreadsheetml.worksheet+xml"/>
-</Types>"""
-
-_PART = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
-<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
-<Relationship Id="r1" Type=\
-"http://schemas.openxmlformats.org/officeDocument/2006/relationships/{kind}" Target="{target}"/>
-</Relationships>"""
-
-_BOOK = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
-<workbook xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main" xmlns:r=\
-"http://schemas.openxmlformats.org/officeDocument/2006/relationships">
-<sheets><sheet name="loops" sheetId="1" r:id="r1"/></sheets></workbook>"""
-
-_SHEET = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
-<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main">
-<sheetViews><sheetView workbookViewId="0"><pane xSplit="2" ySplit="1" topLeftCell="C2" \
-state="frozen"/></sheetView></sheetViews>
-<cols><col min="1" max="1" width="7" customWidth="1"/>\
-<col min="2" max="2" width="24" customWidth="1"/></cols>
-<sheetData>{rows}</sheetData><autoFilter ref="A1:{last}"/></worksheet>"""
 
 
 def row_of(entry: Entry) -> dict[str, Cell]:
@@ -85,54 +52,30 @@ HEAD = tuple(row_of(Entry("", (), Status.OK)))
 
 def write_csv(path: Path, entries: Sequence[Entry]) -> None:
     """Write the list as CSV, UTF-8 with a mark that spreadsheets know it by."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\r\n")
-    writer.writerow(HEAD)
-    for entry in entries:
-        writer.writerow([_short(cell) for cell in row_of(entry).values()])
-    path.write_text(text.getvalue(), encoding="utf-8-sig", newline="")
+    with path.open("w", encoding="utf-8-sig", newline="") as file:
+        writer = csv.writer(file, lineterminator="\r\n")
+        writer.writerow(HEAD)
+        for entry in entries:
+            writer.writerow([_short(cell) for cell in row_of(entry).values()])
 
 
 def write_xlsx(path: Path, entries: Sequence[Entry]) -> None:
-    """Write the list as a workbook of one sheet (ECMA-376), its head frozen and with filters."""
-    table: list[list[Cell]] = [list(HEAD), *[list(row_of(entry).values()) for entry in entries]]
-    rows = "".join(_row(number, row) for number, row in enumerate(table, start=1))
-    sheet = _SHEET.format(rows=rows, last=f"{_column(len(HEAD))}{len(table)}")
-    parts = {
-        "[Content_Types].xml": _TYPES,
-        "_rels/.rels": _PART.format(kind="officeDocument", target="xl/workbook.xml"),
-        "xl/workbook.xml": _BOOK,
-        "xl/_rels/workbook.xml.rels": _PART.format(
-            kind="worksheet", target="worksheets/sheet1.xml"
-        ),
-        "xl/worksheets/sheet1.xml": sheet,
-    }
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as book:
-        for name, content in parts.items():
-            info = zipfile.ZipInfo(name, STAMP)
-            info.compress_type = zipfile.ZIP_DEFLATED
-            book.writestr(info, content)
+    """Write the list as a workbook of one sheet, its head frozen and with filters.
 
+    It takes openpyxl, of the extra ``survey``.
+    """
+    import openpyxl
+    from openpyxl.cell.cell import ILLEGAL_CHARACTERS_RE
 
-def _row(number: int, row: Sequence[Cell]) -> str:
-    made = []
-    for column, value in enumerate(row, start=1):
-        place = f"{_column(column)}{number}"
-        if isinstance(value, str):
-            text = escape("".join(c for c in value if c >= " " or c in "\t\n"))
-            made.append(f'<c r="{place}" t="inlineStr"><is><t>{text}</t></is></c>')
-        elif value is not None:
-            made.append(f'<c r="{place}"><v>{value!r}</v></c>')
-    return f'<row r="{number}">{"".join(made)}</row>'
-
-
-def _column(number: int) -> str:
-    """Return the letters of a column, from 1."""
-    letters = ""
-    while number:
-        number, rest = divmod(number - 1, 26)
-        letters = chr(ord("A") + rest) + letters
-    return letters
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.title = "loops"
+    for row in (HEAD, *(row_of(entry).values() for entry in entries)):
+        legal = [ILLEGAL_CHARACTERS_RE.sub("", c) if isinstance(c, str) else c for c in row]
+        sheet.append(legal)
+    sheet.freeze_panes, sheet.auto_filter.ref = "C2", sheet.dimensions
+    sheet.column_dimensions["B"].width = 24
+    book.save(path)
 
 
 def _short(value: Cell | None) -> str:

@@ -12,7 +12,6 @@ from stiction_ros.pages.signals import Units, all_signals, close_look
 from stiction_ros.records.record import Record
 from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.pages import words as say
-from stiction_ros.survey.pages.trend import PLACE
 from stiction_ros.texts import probability
 
 HEADLINES = {
@@ -68,7 +67,6 @@ def loop_page(
         f"<p>{text(sentence)}</p>" if sentence else "",
         *[f"<p>{words(said)}</p>" for said in _answers(found, entry.op_unit)],
         f'<div class="cards">{"".join(cards)}</div>',
-        PLACE,
         gain_table(gain, unit, op_unit),
         close_look(record, found, units),
         all_signals(record, found.stem if known else None, units),

@@ -16,13 +16,13 @@ CAUSES = {
 PERCENT = "%"  # unit of an OP that is known; another one is the loop's own and has no name
 
 
-def figure(value: float | None, digits: int = 3) -> str:
-    """Return a figure with significant digits; nothing where there is none."""
+def figure(value: float | None) -> str:
+    """Return a figure with three significant digits; nothing where there is none."""
     if value is None or not math.isfinite(value):
         return ""
-    if abs(value) >= 10**digits:
+    if abs(value) >= 1000.0:
         return f"{value:.0f}".replace("-", "−")
-    return f"{value:.{digits}g}".replace("-", "−")
+    return f"{value:.3g}".replace("-", "−")
 
 
 def percent(share: float | None) -> str:
