@@ -87,12 +87,6 @@ def parameter_value(name: str, kind: Parameter.Type, value: object) -> Any:
     return make(name, kind, value).value
 
 
-def parameter_message(name: str, value: object) -> Any:
-    """Return the message that sets a parameter; its kind is that of ``value``."""
-    make: Any = Parameter
-    return make(name, value=value).to_parameter_msg()
-
-
 def trigger(condition: GuardCondition) -> None:
     """Wake the thread that spins the node of ``condition``."""
     untyped: Any = condition

@@ -6,7 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.srv import ChangeState
@@ -14,6 +14,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
@@ -22,7 +23,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from stiction_ros.nodes.shared.typed import end_node, parameter_message, quality
+from stiction_ros.nodes.shared.typed import end_node, quality
 from stiction_studies.faults.loop.rules import Rule, as_it_is
 from stiction_studies.faults.observation import Known, Sampled, Shown
 
@@ -228,8 +229,8 @@ class Probe:
 
     def set_parameters(self, node: str, values: Mapping[str, Any]) -> list[bool]:
         """Set parameters of ``node``; return which were taken, empty when it did not answer."""
-        request = SetParameters.Request()
-        request.parameters = [parameter_message(name, value) for name, value in values.items()]
+        request, make = SetParameters.Request(), cast(Any, Parameter)
+        request.parameters = [make(n, value=v).to_parameter_msg() for n, v in values.items()]
         answer = self._call(SetParameters, f"{node}/set_parameters", request)
         return [] if answer is None else [bool(one.successful) for one in answer.results]
 
