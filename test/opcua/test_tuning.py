@@ -29,9 +29,9 @@ def test_the_file_of_the_page_serves_the_launch_file_and_a_start_by_hand(tmp_pat
     for node in ("controller", "estimator"):
         assert read_nodes(path, without="plant")[node]["pace"] == "realtime"
     (tmp_path / "fic101.loop.yaml").write_text(find_config("flow.loop.yaml").read_text())
-    nodes = bridged_nodes(path, tmp_path, source="topic:pv")
+    nodes = bridged_nodes(path, tmp_path, "topic:pv")
     assert {key: nodes["controller"][key] for key in TUNING} == {"move_worth": [0.01]}
-    write_parameters(nodes, tmp_path / "p.yaml", any_namespace=True)
+    write_parameters(nodes, tmp_path / "p.yaml")
     again = yaml.safe_load((tmp_path / "p.yaml").read_text())
     assert set(again) == {"/**/recorder", "/**/estimator", "/**/controller"}
 
