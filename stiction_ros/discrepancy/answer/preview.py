@@ -108,8 +108,7 @@ def _fitted(found: Discrepancy, key: Name) -> dict[Name, Behaviour]:
     for look in reversed(found.looks):
         for fit in look.scores.fits:
             if fit.candidate.key == key:
-                behaviour = fit.behaviour(look.scores.base.run)
-                return {} if behaviour is None else {key: behaviour}
+                return {} if fit.behaviour is None else {key: fit.behaviour}
     return {}
 
 

@@ -12,7 +12,7 @@ from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate, valve_candidates
 from stiction_ros.discrepancy.decision.decide import GapVerdict
-from stiction_ros.discrepancy.decision.extend import AddedEffect
+from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.decision.scores import Testable
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Behaviour, FloatArray, about
@@ -204,7 +204,7 @@ def _look(run: FreeRun, valve: int) -> StemLook:
         point, left = _nearest(candidate, run, stem)
         gone = 1.0 - left / max(float(before), 1e-300)
         if gone > share:
-            best, share = candidate.behaviour(run, point, np.zeros(0)), gone
+            best, share = candidate.behaviour(point, np.zeros(0)), gone
     shifted = [_left(stem[late:], op[: len(op) - late, None])[0] for late in range(LATEST + 1)]
     late = int(np.argmin(shifted))
     return StemLook(

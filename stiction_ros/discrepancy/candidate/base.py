@@ -81,7 +81,7 @@ class Candidate(ABC):
         """Return the response for points of shape (G, axes), in values."""
 
     @abstractmethod
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour | None:
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour | None:
         """Return the effect with these figures; None outside the catalogue."""
 
     def count(self, point: FloatArray) -> int:
