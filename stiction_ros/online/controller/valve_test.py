@@ -26,8 +26,8 @@ class ValveTest:
 
     OP rests until PV does, makes the moves of the plan, and is judged after each; each further pair
     is chosen by what was answered so far. The test ends when it is decided, friction also known to
-    ``margin``, when :data:`MOST` moves or the limits leave no other, or when something happens that it
-    does not allow for. OP then goes back to where it was, unless someone else has it.
+    ``margin``, when :data:`MOST` moves or the limits leave no other, or when something happens that
+    it does not allow for. OP then goes back to where it was, unless someone else has it.
 
     Attributes:
         over: why it ended; empty while it runs.
