@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 
 import numpy as np
-from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
@@ -19,7 +18,6 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.nodes.shared.managed import LATCHED_READER_QOS, READER_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import rows_of, to_ns, values_of
 from stiction_ros.nodes.shared.peers import PLANTS
-from stiction_ros.nodes.shared.typed import quality
 from stiction_ros.online.controller.testing import ValveTestingController
 from stiction_ros.online.handover.hand_over import Background
 from stiction_ros.online.handover.known_friction import read_offer
@@ -51,8 +49,7 @@ class ControllerInputs(ManagedNode):
     def listen(self) -> None:
         """Subscribe; rclpy serves what is ready in this order."""
         external = self.settings.sp_source == "external"
-        kept = DurabilityPolicy.TRANSIENT_LOCAL if external else None
-        sp_qos = quality(READER_QOS.depth, durability=kept)
+        sp_qos = LATCHED_READER_QOS if external else READER_QOS
         self._draining = False
         self.inlet(JointState, "op_applied", self._on_applied, READER_QOS, PLANTS)
         self.inlet(JointState, "sp", self._on_sp, sp_qos)

@@ -28,7 +28,6 @@ from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QO
 from stiction_ros.nodes.shared.messages import SECOND, to_ns, values_of
 from stiction_ros.nodes.shared.peers import PLANTS
 from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.shared.typed import trigger
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.online.health import stopped_after
@@ -208,7 +207,7 @@ class EstimatorNode(ManagedNode):
             future.cancel()
             return future
         future = self._worker.call(work, *arguments)
-        future.add_done_callback(lambda _future: trigger(self._done))
+        future.add_done_callback(lambda _future: self._done.trigger())
         return future
 
     def _skip(self, found: PairedSample) -> None:

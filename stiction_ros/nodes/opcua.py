@@ -17,7 +17,6 @@ from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QO
 from stiction_ros.nodes.shared.messages import to_ns, values_of
 from stiction_ros.nodes.shared.peers import publishers_of
 from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.shared.typed import trigger
 from stiction_ros.online.plain_settings import OpcuaNodeSettings
 from stiction_ros.opcua import require_asyncua
 from stiction_ros.opcua.loop_bridge import IDENTITIES, BridgeRules, LoopBridge, WriteOrder
@@ -207,7 +206,7 @@ class OpcuaNode(ManagedNode):
         """Called by the link's thread."""
         if not self._woken:
             self._woken = True
-            trigger(self._wakeup)
+            self._wakeup.trigger()
 
     def _serve(self) -> None:
         """Take in what the plant said, publish what is due, write what is to be written."""

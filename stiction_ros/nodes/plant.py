@@ -19,7 +19,6 @@ from stiction_ros.nodes.shared.managed import LOOKS, READER_QOS, SIGNAL_QOS, Man
 from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_ns, to_stamp, values_of
 from stiction_ros.nodes.shared.peers import Outlet, publishers_of
 from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.shared.typed import restart
 from stiction_ros.online.health import stopped_after
 from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
 from stiction_ros.online.plain_settings import PlantNodeSettings
@@ -234,7 +233,7 @@ class PlantNode(ManagedNode):
         before = self._grid.missed
         if self._grid.tick(time.monotonic()):
             if self._pacer is not None:
-                restart(self._pacer)
+                self._pacer.reset()
             if self._grid.missed > before:
                 self._missed += self._grid.missed - before
                 self.notice("pace", "warn", "the plant is slower than its speed asks for")

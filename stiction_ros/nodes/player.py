@@ -16,7 +16,6 @@ from stiction_ros.nodes.shared.managed import SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, message_class, to_stamp
 from stiction_ros.nodes.shared.peers import Outlet
 from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.shared.typed import quality
 from stiction_ros.online.plain_settings import PlayerNodeSettings
 from stiction_ros.records.bag.playback import Playback, bag_content, offered_qos
 from stiction_ros.records.storage.bag_metadata import BagTopic, Qos
@@ -173,11 +172,11 @@ class PlayerNode(ManagedNode):
 
 
 def _profile(qos: Qos) -> QoSProfile:
-    return quality(
-        qos.depth,
-        ReliabilityPolicy[qos.reliability.upper()],
-        DurabilityPolicy[qos.durability.upper()],
-        HistoryPolicy[qos.history.upper()],
+    return QoSProfile(
+        depth=qos.depth,
+        reliability=ReliabilityPolicy[qos.reliability.upper()],
+        durability=DurabilityPolicy[qos.durability.upper()],
+        history=HistoryPolicy[qos.history.upper()],
     )
 
 

@@ -20,7 +20,6 @@ from stiction_ros.nodes.shared.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, message_class, offered_qos, reader_qos
 from stiction_ros.nodes.shared.peers import Inlet
 from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.shared.typed import RawTake, subscribe_raw
 from stiction_ros.online.health import Noticed
 from stiction_ros.online.plain_settings import RecorderNodeSettings
 from stiction_ros.records.bag.finish import CLOCK
@@ -167,12 +166,12 @@ class RecorderNode(ManagedNode):
         text, type_hash = definition(kind)
         self.writer.add_topic(name, kind, text, type_hash, [offered_qos(i) for i in offered])
         qos = reader_qos(offered, READER_QOS.depth)
-        subscription = subscribe_raw(
-            self,
+        subscription = self.create_subscription(
             message_class(kind),
             name,
             self._writing(name, kind),
             qos,
+            raw=True,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         self._topics[name] = Inlet(subscription, (), qos, informed=True)
@@ -223,7 +222,7 @@ class RecorderNode(ManagedNode):
                     self.log.warning(f"{name} of {self._unheard[name]} is not recorded")
                     break
 
-    def _writing(self, topic: str, kind: str) -> RawTake:
+    def _writing(self, topic: str, kind: str) -> Callable[..., None]:
         """Return the callback of one topic; log time is simulated time where there is any."""
         tells_time = (topic, kind) in {(CLOCK, CLOCK_TYPE), (self._own_pv, JOINT_STATE)}
 

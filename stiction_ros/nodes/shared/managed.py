@@ -12,8 +12,9 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.timer import Timer
 from std_msgs.msg import String
 
@@ -22,15 +23,14 @@ from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared import parameters
 from stiction_ros.nodes.shared.messages import status, to_stamp
 from stiction_ros.nodes.shared.peers import Inlet, Outlet, Patience, Peers, known_as
-from stiction_ros.nodes.shared.typed import Log, log_of, quality
 from stiction_ros.online.health import LEVELS, Noticed
 from stiction_ros.settings import changed
 
-SIGNAL_QOS = quality(100, ReliabilityPolicy.RELIABLE)
+SIGNAL_QOS = QoSProfile(depth=100)
 # What waits for a process that is busy for a moment; writers keep SIGNAL_QOS.
-READER_QOS = quality(5000, ReliabilityPolicy.RELIABLE)
-LATCHED_QOS = quality(1, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
-LATCHED_READER_QOS = quality(100, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
+READER_QOS = QoSProfile(depth=5000)
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED_READER_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ACK_PATIENCE = 3.0  # s for all topics together: a reader that was killed never answers
 LINK_PATIENCE = 5.0  # s until a node says what it waits for
 LINK_REMINDER = 30.0  # s until it says so again
@@ -68,9 +68,10 @@ class ManagedNode(LifecycleNode):
         self.add_on_set_parameters_callback(self._on_set)
 
     @property
-    def log(self) -> Log:
+    def log(self) -> RcutilsLogger:
         """The logger of the node."""
-        return log_of(self)
+        log: RcutilsLogger = self.get_logger()
+        return log
 
     def create_timer(
         self,
@@ -140,7 +141,7 @@ class ManagedNode(LifecycleNode):
     def _configure(self) -> None:
         parameters.refuse_unknown(self)
         self.settings = parameters.read(self, self.settings_class)
-        self._diagnostics = self.outlet(DiagnosticArray, "/diagnostics", quality(100))
+        self._diagnostics = self.outlet(DiagnosticArray, "/diagnostics", QoSProfile(depth=100))
         self._looks, self._told_level = 0, "ok"
         self._beat = self.create_timer(LOOK_PERIOD, self._look_around)
         self.configure()

@@ -16,7 +16,6 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.nodes.shared.typed import quality
 from stiction_ros.records.storage.bag_metadata import INFINITE_NS, Qos
 
 if TYPE_CHECKING:  # nodes that control nothing load nothing of control
@@ -153,8 +152,8 @@ def reader_qos(offered: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
     profiles = [info.qos_profile for info in offered]
     reliable = all(p.reliability is ReliabilityPolicy.RELIABLE for p in profiles)
     latched = all(p.durability is DurabilityPolicy.TRANSIENT_LOCAL for p in profiles)
-    return quality(
-        depth,
-        ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )

@@ -14,7 +14,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from stiction_ros.errors import InputError
-from stiction_ros.nodes.shared.typed import parameter_value
 from stiction_ros.settings import Setting, check, settings_of
 
 _TYPES = {
@@ -87,7 +86,7 @@ def as_mapping(settings: Any) -> dict[str, Any]:
 
 def _default(entry: Setting) -> Any:
     value = list(entry.default) if isinstance(entry.default, tuple) else entry.default
-    return parameter_value(entry.name, _TYPES[entry.kind], value) if value != [] else [""]
+    return Parameter(entry.name, _TYPES[entry.kind], value).value if value != [] else [""]
 
 
 def _descriptor(entry: Setting) -> ParameterDescriptor:

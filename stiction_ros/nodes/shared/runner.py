@@ -21,10 +21,10 @@ from rclpy.exceptions import (
 )
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
 
 from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared.managed import ManagedNode
-from stiction_ros.nodes.shared.typed import leave
 from stiction_ros.orphans import DIE_WITH_PARENT, die_with_parent
 
 HELP = """usage: {name} [--ros-args [-p NAME:=VALUE ...] [--params-file FILE] [-r FROM:=TO ...]]
@@ -186,7 +186,9 @@ def run(
             node.finish()
         return 0
     finally:
-        leave(node)
+        if node is not None:
+            node.destroy_node()
+        try_shutdown()
         for number in (signal.SIGINT, signal.SIGTERM):  # Python would die of one while it ends
             signal.signal(number, signal.SIG_IGN)
 
