@@ -20,7 +20,6 @@ from stiction_ros.nodes.estimates import tested_message
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, diagnosis, joint_state, to_ns, trajectory
 from stiction_ros.nodes.shared.peers import publishers_of
-from stiction_ros.nodes.shared.runner import run
 from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.controller.making import thinned_plan
 from stiction_ros.online.controller.settings import LiveControllerSettings
@@ -309,12 +308,3 @@ class ControllerNode(ControllerInputs):
         names = publishers_of(self, "op")
         if len(names) > 1:
             self.notice("commanders", "error", f"op is published by {', '.join(sorted(names))}")
-
-
-def main() -> int:
-    """Run the node."""
-    return run("controller", "Model predictive control that learns of stiction.", ControllerNode)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

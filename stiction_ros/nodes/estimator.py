@@ -27,7 +27,6 @@ from stiction_ros.nodes.estimates import (
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, to_ns, values_of
 from stiction_ros.nodes.shared.peers import PLANTS
-from stiction_ros.nodes.shared.runner import run
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.online.health import stopped_after
@@ -265,12 +264,3 @@ class EstimatorNode(ManagedNode):
         self._said = f"last window: {verdicts_of(update)}"
         self.log.info(f"window to sample {update.end}: {figures_of(update)}")
         self.report([fit_status(stamp, update)])
-
-
-def main() -> int:
-    """Run the node."""
-    return run("estimator", "Identifies friction and process from op and pv.", EstimatorNode)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

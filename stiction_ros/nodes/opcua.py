@@ -16,7 +16,6 @@ from stiction_ros.nodes.opcua_topics import LoopTopics, grant_keys
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import to_ns, values_of
 from stiction_ros.nodes.shared.peers import publishers_of
-from stiction_ros.nodes.shared.runner import run
 from stiction_ros.online.plain_settings import OpcuaNodeSettings
 from stiction_ros.opcua import require_asyncua
 from stiction_ros.opcua.loop_bridge import IDENTITIES, BridgeRules, LoopBridge, WriteOrder
@@ -308,12 +307,3 @@ class OpcuaNode(ManagedNode):
         self._tell_grants()
         response.success, response.message = True, "given back"
         return response
-
-
-def main() -> int:
-    """Run the node."""
-    return run("opcua", "Bridges loops of a control system by OPC UA.", OpcuaNode)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

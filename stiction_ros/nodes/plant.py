@@ -18,7 +18,6 @@ from stiction_ros.loop.member_loops import MemberLoop, Wiring, read_member_loops
 from stiction_ros.nodes.shared.managed import LOOKS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_ns, to_stamp, values_of
 from stiction_ros.nodes.shared.peers import Outlet, publishers_of
-from stiction_ros.nodes.shared.runner import run
 from stiction_ros.online.health import stopped_after
 from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
 from stiction_ros.online.plain_settings import PlantNodeSettings
@@ -280,12 +279,3 @@ class PlantNode(ManagedNode):
         for joined in self._loops:
             shown = self.wiring.of(joined.loop, measured.pv)
             joined.pv.publish(joint_state(self.stamp, joined.loop.outputs, shown))
-
-
-def main() -> int:
-    """Run the node."""
-    return run("plant", "Simulates a loop model with sticky valves.", PlantNode)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

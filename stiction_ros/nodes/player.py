@@ -15,7 +15,6 @@ from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, message_class, to_stamp
 from stiction_ros.nodes.shared.peers import Outlet
-from stiction_ros.nodes.shared.runner import run
 from stiction_ros.online.plain_settings import PlayerNodeSettings
 from stiction_ros.records.bag.playback import Playback, bag_content, offered_qos
 from stiction_ros.records.storage.bag_metadata import BagTopic, Qos
@@ -178,12 +177,3 @@ def _profile(qos: Qos) -> QoSProfile:
         durability=DurabilityPolicy[qos.durability.upper()],
         history=HistoryPolicy[qos.history.upper()],
     )
-
-
-def main() -> int:
-    """Run the node."""
-    return run("player", "Plays a bag back into the graph.", PlayerNode)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

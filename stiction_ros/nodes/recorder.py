@@ -19,7 +19,6 @@ from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, message_class, offered_qos, reader_qos
 from stiction_ros.nodes.shared.peers import Inlet
-from stiction_ros.nodes.shared.runner import run
 from stiction_ros.online.health import Noticed
 from stiction_ros.online.plain_settings import RecorderNodeSettings
 from stiction_ros.records.bag.finish import CLOCK
@@ -267,12 +266,3 @@ def free_directory(wanted: Path, written: Collection[Path]) -> Path:
         return wanted
     beside = (wanted.with_name(f"{wanted.name}_{number}") for number in itertools.count(2))
     return next(path for path in beside if not path.exists())
-
-
-def main() -> int:
-    """Run the node."""
-    return run("recorder", "Records every topic into one MCAP bag.", RecorderNode)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
