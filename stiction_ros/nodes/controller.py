@@ -3,6 +3,7 @@
 import dataclasses
 import time
 from collections import deque
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from rclpy.timer import Timer
@@ -24,7 +25,7 @@ from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.controller.making import thinned_plan
 from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.controller.testing import ValveTestingController
-from stiction_ros.online.handover.hand_over import AtOnce, Beside
+from stiction_ros.online.handover.hand_over import AtOnce
 from stiction_ros.online.input.port import InputPort
 from stiction_ros.online.input.port_health import PortHealth, keys
 from stiction_ros.online.input.samples import PortRules, Sample
@@ -78,7 +79,7 @@ class ControllerNode(ControllerInputs):
             )
         self.model = LoopModel.load(find_config(settings.model))
         lockstep = settings.pace == "lockstep"
-        self.background = AtOnce() if lockstep else Beside()
+        self.background = AtOnce() if lockstep else ThreadPoolExecutor(1, "beside")
         self.live = ValveTestingController(settings, self.model, self.background)
         if not lockstep:
             rehearse(settings, self.model)
