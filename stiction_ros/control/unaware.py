@@ -94,7 +94,7 @@ class UnawareMpc(Formulation):
             v, slack = plan.reshape(-1), self._qp.slack(z, plan, target.pv)
             cost = float(v @ (0.5 * self.cost.hessian @ v + linear))
             cost = cost + self.cost.constant(z, before, target.path) + self._qp.slack_cost(slack)
-            found = HorizonSolution(plan, cost, slack, v)
+            found = HorizonSolution(plan, cost, slack)
             both.append(self._plan(state, target, found, cost, converged=False))
         if not np.isfinite(both[0].cost) or both[0].cost > both[1].cost:
             return None
