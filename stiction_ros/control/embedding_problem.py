@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.control.horizon import HorizonCost, HorizonLimits
-from stiction_ros.control.horizon_qp import HorizonQp, HorizonSolution, SharedTerms
+from stiction_ros.control.horizon_qp import HorizonQp, HorizonSolution
 from stiction_ros.control.target import Target
 from stiction_ros.effects.behaviour import FloatArray
 
@@ -115,13 +115,12 @@ class EmbeddingProblem:
         lower, upper = self._bounds(target, valves)
         return self._qp.solve(
             state - target.state,
-            deviation,
-            self._anchors @ deviation,
+            gradient,
             lower,
             upper,
             target.pv,
-            target.path,
-            SharedTerms(gradient, self._curved @ deviation),
+            self._anchors @ deviation,
+            self._curved @ deviation,
         )
 
     def _bounds(self, target: Target, valves: StickyState) -> tuple[FloatArray, FloatArray]:

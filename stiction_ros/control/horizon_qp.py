@@ -23,14 +23,6 @@ class HorizonSolution:
     pv: FloatArray | None = None  # outputs at 1 … N, shape (N, p), if soft bounds asked for them
 
 
-@dataclasses.dataclass(frozen=True)
-class SharedTerms:
-    """Products that several programmes of one step share."""
-
-    gradient: FloatArray  # of ``HorizonCost.linear``, shape (N m,)
-    curved: FloatArray  # Hessian times the offset, shape (N m,)
-
-
 class Programme:
     """min x'Hx/2 + f'x with bounds on x and then on the rows A x; only vectors change."""
 
@@ -124,30 +116,28 @@ class HorizonQp:
     def solve(
         self,
         state: FloatArray,
-        last: FloatArray,
-        offset: FloatArray,
+        gradient: FloatArray,
         lower: FloatArray,
         upper: FloatArray,
         target_pv: FloatArray,
-        path: FloatArray | None = None,
-        shared: SharedTerms | None = None,
+        offset: FloatArray | None = None,
+        curved: FloatArray | None = None,
     ) -> HorizonSolution | None:
         """Return the best plan, or None when there is none.
 
         Args:
             state: ξ̂ − ξ_ss, shape (n,).
-            last: χ₋₁ − χ_ss, shape (m,).
-            offset: v₀, shape (N m,).
+            gradient: by :meth:`HorizonCost.linear`, shape (N m,).
             lower, upper: bounds on r and then on the further rows, shape (r + c,).
             target_pv: outputs at the target, shape (p,), about which soft bounds are written.
-            path: as in :meth:`HorizonCost.linear`.
-            shared: products that the caller has already; None computes them.
+            offset: v₀, shape (N m,); None for 0.
+            curved: H v₀, shape (N m,), with an offset.
         """
         self.limit_reached = False
-        gradient = self.cost.linear(state, last, path) if shared is None else shared.gradient
         base = 0.0
-        if shared is not None or offset.any():
-            curved = self.cost.hessian @ offset if shared is None else shared.curved
+        if offset is None or curved is None:
+            offset = np.zeros(len(gradient))
+        else:
             base = float(offset @ (0.5 * curved + gradient))
             gradient = gradient + curved
         linear = self.shape.T @ gradient
