@@ -57,6 +57,17 @@ def values_of(message: JointState, names: Sequence[str]) -> FloatArray | None:
     return np.array([found[name] for name in names], dtype=float)
 
 
+def measured_of(message: JointState, names: Sequence[str]) -> FloatArray | None:
+    """Return the values of ``names``, NaN for those without one; None when no name is there."""
+    values = values_of(message, names)
+    if values is not None:
+        return values
+    if not set(names).intersection(message.name):
+        return None
+    found = dict(zip(message.name, message.position, strict=False))
+    return np.array([found.get(name, np.nan) for name in names], dtype=float)
+
+
 def trajectory(
     stamp: int, names: Sequence[str], rows: FloatArray, times: Sequence[float]
 ) -> JointTrajectory:

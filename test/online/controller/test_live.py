@@ -19,7 +19,7 @@ from stiction_ros.effects import (
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints, ValveChange
 from stiction_ros.online.controller.live import LiveController
-from stiction_ros.online.controller.making import thinned_plan
+from stiction_ros.online.controller.plans import thinned_plan
 from stiction_ros.online.controller.settings import LiveControllerSettings
 
 PLANT = LoopModel.load(find_config("example1.loop.yaml"))
