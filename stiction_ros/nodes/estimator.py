@@ -3,6 +3,7 @@
 import time
 from collections import Counter, deque
 from concurrent.futures import Future
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -62,7 +63,7 @@ class EstimatorNode(ManagedNode):
         self._done = self.create_guard_condition(self._collect)
         self._stiction = self.outlet(JointState, "stiction", SIGNAL_QOS, ("controller",))
         self._model = self.outlet(String, "loop_model", LATCHED_QOS, ("controller",))
-        self.inlet(JointState, "op_applied", self._on_applied, READER_QOS)
+        self.inlet(JointState, "op_applied", partial(self._on_op, applied=True), READER_QOS)
         self.inlet(JointState, "op", self._on_op, READER_QOS, ("controller",))
         self.inlet(JointState, "pv", self._on_pv, READER_QOS, PLANTS)
 
@@ -144,17 +145,12 @@ class EstimatorNode(ManagedNode):
             self._outputs = self._outputs or tuple(message.name)
             self._take(self._pairs.add_pv(to_ns(message.header.stamp), pv))
 
-    def _on_op(self, message: JointState) -> None:
+    def _on_op(self, message: JointState, *, applied: bool = False) -> None:
         op = self._values("op", message, self._valves)
         if op is not None:
             self._valves = self._valves or tuple(message.name)
-            self._take(self._pairs.add_op(to_ns(message.header.stamp), op))
-
-    def _on_applied(self, message: JointState) -> None:
-        op = self._values("op", message, self._valves)
-        if op is not None:
-            self._valves = self._valves or tuple(message.name)
-            self._take(self._pairs.add_applied(to_ns(message.header.stamp), op))
+            add = self._pairs.add_applied if applied else self._pairs.add_op
+            self._take(add(to_ns(message.header.stamp), op))
 
     def _values(self, topic: str, message: JointState, names: tuple[str, ...]) -> FloatArray | None:
         """Return the values of ``names``; None, and counted, where a message lacks one.
