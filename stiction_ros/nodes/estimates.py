@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 Rows = Mapping[str, tuple[float, float, float]]
 Keys = list[tuple[str, object]]
+FIGURES = ("gap", "baseline", "growth", "limit", "free_run_rmse", "noise_floor")  # of an output
 
 
 def friction_message(stamp: int, by: str, rows: Rows) -> JointState:
@@ -84,14 +85,7 @@ def monitor_status(
     if look is not None:
         keys.append(("window_end", stamp_of(look.end)))
         for output in look.outputs:
-            keys += [
-                (f"{output.name}.gap", output.gap),
-                (f"{output.name}.baseline", output.baseline),
-                (f"{output.name}.growth", output.growth),
-                (f"{output.name}.limit", output.limit),
-                (f"{output.name}.free_run_rmse", output.free_run_rmse),
-                (f"{output.name}.noise_floor", output.noise_floor),
-            ]
+            keys += [(f"{output.name}.{key}", getattr(output, key)) for key in FIGURES]
     if finding is not None:
         keys += [
             ("verdict", finding.word),

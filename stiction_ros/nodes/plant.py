@@ -19,7 +19,7 @@ from stiction_ros.nodes.shared.managed import LOOKS, READER_QOS, SIGNAL_QOS, Man
 from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_ns, to_stamp, values_of
 from stiction_ros.nodes.shared.peers import Outlet, publishers_of
 from stiction_ros.online.health import stopped_after
-from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
+from stiction_ros.online.input.op_port import OpPort, Reception
 from stiction_ros.online.plain_settings import PlantNodeSettings
 from stiction_ros.online.round_trips import RoundTrips, TickGrid
 
@@ -87,11 +87,10 @@ class PlantNode(ManagedNode):
         """Create the topics of one loop, in the namespace of its name."""
         space = f"{loop.name}/" if loop.name else ""  # of one loop alone: that of the plant
         controller, estimator = f"{space}controller", f"{space}estimator"
-        rules = CommandRules(self._commander(space), self._step, exact=not self._realtime)
         op = self.wiring.op_of(loop)
         joined = JoinedLoop(
             loop,
-            op_port=OpPort(rules),
+            op_port=OpPort(self._commander(space), self._step, exact=not self._realtime),
             op=op,
             # What was in force before the run: a reader knows the OP of its first sample.
             applied=joint_state(self._start - self._step, loop.valves, op),

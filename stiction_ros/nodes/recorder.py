@@ -3,7 +3,6 @@
 import itertools
 import re
 import struct
-import time
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,6 @@ from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, message_class, offered_qos, reader_qos
 from stiction_ros.nodes.shared.peers import Inlet
-from stiction_ros.online.health import Noticed
 from stiction_ros.online.plain_settings import RecorderNodeSettings
 from stiction_ros.records.bag.finish import CLOCK
 from stiction_ros.records.bag.message_definitions import definition
@@ -88,7 +86,6 @@ class RecorderNode(ManagedNode):
         self._topics: dict[str, Inlet] = {}
         self._skipped: dict[str, str] = {}
         self._unheard: dict[str, str] = {}
-        self._noticed = Noticed(time.monotonic)
         self._lost = self._put_back = 0
         self._times = LogTime()
         own = settings.regex == OWN and space != "/"
@@ -108,8 +105,6 @@ class RecorderNode(ManagedNode):
         keys += [(f"skipped:{name}", why) for name, why in self._skipped.items()]
         keys += [(f"unheard:{name}", why) for name, why in self._unheard.items()]
         keys += [("lost", self._lost), ("put_back", self._put_back)]
-        if self._noticed.level == "error":
-            return "error", self._noticed.text, keys
         return ("warn" if self._skipped or self._unheard else "ok"), "recording", keys
 
     def finish(self) -> None:
@@ -199,15 +194,14 @@ class RecorderNode(ManagedNode):
             )
         else:
             self._put_back += bool(said)
-        if said and self._noticed.notice("removed", "error", said):
-            self.log.error(said)
+        if said:
+            self.notice("removed", "error", said)
 
     def _refused(self, error: OSError) -> None:
         """Note that the storage refused something."""
         assert self.writer is not None
         said = f"{self.writer.directory}: {error.strerror}; {self._lost} messages lost so far"
-        if self._noticed.notice("storage", "error", said):
-            self.log.error(said)
+        self.notice("storage", "error", said)
 
     def _look_for_unheard(self) -> None:
         """Tell of publishers that came later and offer less than the subscription asks for."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.online.health import stopped_after
-from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
+from stiction_ros.online.input.op_port import OpPort, Reception
 from stiction_ros.opcua.grant import Facts, GrantState, begin
 from stiction_ros.opcua.op_limits import OpLimits, RateWatch
 from stiction_ros.opcua.sampling import LoopSampler, PlantSample, TagQuality, TagReading
@@ -107,7 +107,7 @@ class LoopBridge:
         self.grant = begin(now, rules.writes and tags.grant is not None)
         if rules.asks:
             self.grant = self.grant.ask()
-        self.op_port = OpPort(CommandRules(rules.commander, tags.sample_ns, exact=False))
+        self.op_port = OpPort(rules.commander, tags.sample_ns, exact=False)
         self.counts: Counter[str] = Counter()
         self.refused: tuple[str, ...] = ()
         valves = tags.valves

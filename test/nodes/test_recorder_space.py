@@ -84,6 +84,8 @@ class Site:
 
     def health(self) -> tuple[str, str, dict[str, str]]:
         level, said, values = self.recorder.health()
+        if self.recorder.noticed.level == "error":
+            level, said = "error", self.recorder.noticed.text
         return level, said, {key: str(value) for key, value in values}
 
 
