@@ -201,7 +201,7 @@ class EstimatorNode(ManagedNode):
             future: Future[Any] = Future()
             future.cancel()
             return future
-        future = self._worker.call(work, *arguments)
+        future = self._worker.submit(work, *arguments)
         future.add_done_callback(lambda _future: self._done.trigger())
         return future
 

@@ -15,7 +15,6 @@ from stiction_ros.errors import InputError
 from stiction_ros.nodes.opcua_topics import LoopTopics, grant_keys
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import to_ns, values_of
-from stiction_ros.nodes.shared.peers import publishers_of
 from stiction_ros.online.plain_settings import OpcuaNodeSettings
 from stiction_ros.opcua import require_asyncua
 from stiction_ros.opcua.loop_bridge import IDENTITIES, BridgeRules, LoopBridge, WriteOrder
@@ -26,7 +25,6 @@ from stiction_ros.opcua.tag_map import LoopTags, TagMap, check_address
 QUICKEST, SLOWEST = 0.005, 0.05  # s between two looks for samples that are due
 PART = 10  # looks in a sample
 TOLD = 20  # loops that have a status of their own each; of more, those that are not well
-GRAPH_LOOKS = 10  # looks at the loop until the next one at who commands
 
 
 class OpcuaNode(ManagedNode):
@@ -56,7 +54,6 @@ class OpcuaNode(ManagedNode):
         self._said = "not connected yet"
         self._losses = 0
         self._refused: set[str] = set()
-        self._graph_looks = 0
         identity = random.SystemRandom().randrange(1, IDENTITIES)
         self.bridges: dict[str, LoopBridge] = {}
         self._topics: dict[str, LoopTopics] = {}
@@ -188,16 +185,6 @@ class OpcuaNode(ManagedNode):
             if level != "ok" or len(self.bridges) <= TOLD:
                 found.append((level, f"loop {name}", text, values))
         return found
-
-    def look(self) -> None:
-        self._graph_looks += 1
-        if self._graph_looks % GRAPH_LOOKS:
-            return
-        for name in self._writes:
-            topic = self._topics[name].pv.publisher.topic_name.removesuffix("pv") + "op"
-            names = publishers_of(self, topic)
-            if len(names) > 1:
-                self.notice("commanders", "error", f"op is published by {', '.join(names)}")
 
     # ---- the plant -------------------------------------------------------------------------
 

@@ -71,7 +71,7 @@ class PlantNode(ManagedNode):
         )
         self.plant = Plant(self.model, settings.seed, changes)
         self._step = round(self.model.sample_time * SECOND)
-        self._start = round(settings.start_time * SECOND)
+        self._start = SECOND  # simulated time of the first sample
         self.stamp = self._start
         self._realtime = settings.pace == "realtime"
         loops = read_member_loops(settings.loops, self.model, "plant: loops")

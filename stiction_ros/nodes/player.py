@@ -1,9 +1,8 @@
 """The player: a bag back into the graph, at any rate, with pause and steps."""
 
+import time
 from typing import Any
 
-from rclpy.clock import Clock as RosClock
-from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -33,7 +32,6 @@ class PlayerNode(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("player", PlayerNodeSettings, **kwargs)
-        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
         self._pacer: Timer | None = None
         self._offered: list[Any] = []
 
@@ -43,7 +41,7 @@ class PlayerNode(ManagedNode):
             raise InputError("no bag", where="player: bag", fix="set it to a bag")
         content = bag_content(settings.bag, settings.topics)
         how = settings.rate, settings.start, settings.loop
-        self.playback = Playback(content, self._now, *how)
+        self.playback = Playback(content, time.monotonic_ns, *how)
         self._skipped: dict[str, str] = {}
         self._topics: dict[str, Outlet] = {}
         recorded = settings.clock == "auto" and CLOCK in content.topics
@@ -65,7 +63,7 @@ class PlayerNode(ManagedNode):
                 ("step", self._on_step),
             )
         ]
-        self._pacer = self.create_timer(PERIOD, self._tick, clock=self._steady)
+        self._pacer = self.create_timer(PERIOD, self._tick)
 
     def linked(self) -> None:
         if self._resumes:
@@ -115,9 +113,6 @@ class PlayerNode(ManagedNode):
         known = self.outlets.get(topic.name)
         self._topics[topic.name] = known or self.outlet(kind, topic.name, qos)
 
-    def _now(self) -> int:
-        return int(self._steady.now().nanoseconds)
-
     def _tick(self) -> None:
         if not self.running:
             return
@@ -133,8 +128,9 @@ class PlayerNode(ManagedNode):
     def _send(self, messages: list[RawMessage]) -> None:
         """Publish; the player's own clock goes before the messages of its time."""
         self.stamp = self.playback.time
-        if self._own and (messages or self._now() - self._told > SECOND / self.settings.clock_rate):
-            self._told = self._now()
+        now = time.monotonic_ns()
+        if self._own and (messages or now - self._told > SECOND / self.settings.clock_rate):
+            self._told = now
             self._clock_out.publish(Clock(clock=to_stamp(self.stamp)))
         for message in messages:
             outlet = self._topics.get(message.topic.name)
@@ -164,8 +160,8 @@ class PlayerNode(ManagedNode):
     def _answer(self, response: Trigger.Response) -> Trigger.Response:
         """Fill the answer in: the time that is being played."""
         response.success = bool(self.running)
-        time = f"at {self.playback.time / SECOND:.9f} s"
-        response.message = time if self.running else "not active"
+        at = f"at {self.playback.time / SECOND:.9f} s"
+        response.message = at if self.running else "not active"
         self.report()
         return response
 

@@ -7,8 +7,6 @@ from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.qos import QoSCompatibility, qos_check_compatible
@@ -70,7 +68,6 @@ class RecorderNode(ManagedNode):
         super().__init__("recorder", RecorderNodeSettings, **kwargs)
         self.writer: BagWriter | None = None
         self._bags: list[Path] = []
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
 
     def configure(self) -> None:
         settings = self.settings
@@ -92,8 +89,8 @@ class RecorderNode(ManagedNode):
         self._own_pv = self.resolve_topic_name("pv") if own else ""
         self._clock_runs = False
         self._looking = [
-            self.create_timer(DISCOVERY_PERIOD, self._discover, clock=self._steady),
-            self.create_timer(BAG_PERIOD, self._look_at_the_bag, clock=self._steady),
+            self.create_timer(DISCOVERY_PERIOD, self._discover),
+            self.create_timer(BAG_PERIOD, self._look_at_the_bag),
         ]
         self._discover()  # now, or its own first status would find no reader
 
