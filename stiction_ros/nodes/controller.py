@@ -61,11 +61,8 @@ class ControllerNode(ManagedNode):
 
     def configure(self) -> None:
         settings = self.settings
-        if not settings.model:
-            raise InputError(
-                "no loop model", where="controller: model", fix="set it to a *.loop.yaml"
-            )
-        self.model = LoopModel.load(find_config(settings.model))
+        model = self.needed("model", "loop model", "*.loop.yaml")
+        self.model = LoopModel.load(find_config(model))
         lockstep = settings.pace == "lockstep"
         self.background: Executor = AtOnce() if lockstep else ThreadPoolExecutor(1, "beside")
         self.live = ValveTestingController(settings, self.model, self.background)

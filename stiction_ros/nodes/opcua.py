@@ -42,10 +42,8 @@ class OpcuaNode(ManagedNode):
     def configure(self) -> None:
         settings = self.settings
         require_asyncua()
-        if not settings.tags:
-            raise InputError("no tag map", where="opcua: tags", fix="set it to a *.tags.yaml")
+        told = TagMap.load(find_config(self.needed("tags", "tag map", "*.tags.yaml")))
         self._writes = settings.write
-        told = TagMap.load(find_config(settings.tags))
         self._loops = self._chosen(told)
         self._url = settings.url or told.server
         check_address(self._url, "opcua: url")
@@ -91,7 +89,7 @@ class OpcuaNode(ManagedNode):
             settings.speed,
             writes,
             writes and settings.ask == "start",
-            self._commander(tags),
+            self.commander(tags.namespace),
             identity,
         )
         self.bridges[name] = LoopBridge(tags, rules, time.monotonic())
@@ -118,14 +116,6 @@ class OpcuaNode(ManagedNode):
 
     def _outlet_if(self, there: bool, topic: str) -> Any:
         return self.outlet(JointState, topic, SIGNAL_QOS, ("controller",)) if there else None
-
-    def _commander(self, tags: LoopTags) -> str:
-        """Return the full name of the node whose OP is written."""
-        name = str(self.settings.commander)
-        if name.startswith("/"):
-            return name
-        parts = (self.get_namespace().strip("/"), tags.namespace, name)
-        return "/" + "/".join(part for part in parts if part)
 
     def configuration(self) -> dict[str, Any]:
         return {"url": self._url, "bridged": [tags.loop for tags in self._loops]}

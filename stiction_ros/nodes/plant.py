@@ -12,7 +12,6 @@ from sensor_msgs.msg import JointState
 
 from stiction_ros.config_files import find_config
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints, read_valve_changes
 from stiction_ros.loop.member_loops import MemberLoop, Wiring, read_member_loops, whole_plant
 from stiction_ros.nodes.shared.managed import LOOKS, READER_QOS, SIGNAL_QOS, ManagedNode
@@ -59,9 +58,8 @@ class PlantNode(ManagedNode):
 
     def configure(self) -> None:
         settings = self.settings
-        if not settings.model:
-            raise InputError("no loop model", where="plant: model", fix="set it to a *.loop.yaml")
-        self.model = LoopModel.load(find_config(settings.model))
+        model = self.needed("model", "loop model", "*.loop.yaml")
+        self.model = LoopModel.load(find_config(model))
         self.schedule = None
         if settings.set_points:
             path = find_config(settings.set_points)
@@ -87,10 +85,11 @@ class PlantNode(ManagedNode):
         """Create the topics of one loop, in the namespace of its name."""
         space = f"{loop.name}/" if loop.name else ""  # of one loop alone: that of the plant
         controller, estimator = f"{space}controller", f"{space}estimator"
+        commander = self.commander(loop.name) if self.settings.commander else ""
         op = self.wiring.op_of(loop)
         joined = JoinedLoop(
             loop,
-            op_port=OpPort(self._commander(space), self._step, exact=not self._realtime),
+            op_port=OpPort(commander, self._step, exact=not self._realtime),
             op=op,
             # What was in force before the run: a reader knows the OP of its first sample.
             applied=joint_state(self._start - self._step, loop.valves, op),
@@ -106,13 +105,6 @@ class PlantNode(ManagedNode):
         take = functools.partial(self._on_op, joined)
         self.inlet(JointState, f"{space}op", take, READER_QOS, (controller,))
         return joined
-
-    def _commander(self, space: str) -> str:
-        """Return the full name of the node that commands; empty for the first that does."""
-        name = str(self.settings.commander)
-        if not name or name.startswith("/"):
-            return name
-        return f"{self.get_namespace().rstrip('/')}/{space}{name}"
 
     def configuration(self) -> dict[str, Any]:
         told = {"seed": self.settings.seed, "model": self.model.to_mapping()}

@@ -37,9 +37,7 @@ class PlayerNode(ManagedNode):
 
     def configure(self) -> None:
         settings = self.settings
-        if not settings.bag:
-            raise InputError("no bag", where="player: bag", fix="set it to a bag")
-        content = bag_content(settings.bag, settings.topics)
+        content = bag_content(self.needed("bag", "bag", "bag"), settings.topics)
         how = settings.rate, settings.start, settings.loop
         self.playback = Playback(content, time.monotonic_ns, *how)
         self._skipped: dict[str, str] = {}

@@ -279,6 +279,22 @@ class ManagedNode(LifecycleNode):
 
     # ---- parameters ------------------------------------------------------------------------
 
+    def needed(self, key: str, what: str, kind: str) -> str:
+        """Return a text parameter; InputError, which says of what ``kind`` it is, if empty."""
+        value = str(getattr(self.settings, key))
+        if not value:
+            where = f"{self.get_name()}: {key}"
+            raise InputError(f"no {what}", where=where, fix=f"set it to a {kind}")
+        return value
+
+    def commander(self, space: str = "") -> str:
+        """Return the full name of the node that commands a loop in the namespace ``space``."""
+        name = str(self.settings.commander)
+        if name.startswith("/"):
+            return name
+        parts = (self.get_namespace().strip("/"), space, name)
+        return "/" + "/".join(part for part in parts if part)
+
     def configuration(self) -> dict[str, Any]:
         """Return what ``~/config`` tells besides the parameters."""
         return {}
