@@ -208,7 +208,7 @@ class EmbeddingMpc(Formulation):
             problem = self._problems[i]
             solution = problem.solve(state, target, valves, gradient)
             self.solved += 1
-            converged = converged and not problem.limit_reached
+            converged = converged and not problem.qp.limit_reached
             if solution is None:
                 continue
             cost = solution.cost + self.tuning.jump_price * problem.jumps

@@ -317,7 +317,7 @@ class ControllerNode(ManagedNode):
         self._draining = True
         try:
             for topic in DRAINED:
-                self.drain(topic)
+                self.inlets[topic].drain()
         finally:
             self._draining = False
 

@@ -210,10 +210,6 @@ class ManagedNode(LifecycleNode):
         subscription = self.create_subscription(kind, topic, take, qos)
         self.inlets[topic] = Inlet(subscription, writers, qos)
 
-    def drain(self, topic: str) -> int:
-        """Hand all that is queued on an inlet to its callback now, and count it."""
-        return self.inlets[topic].drain()
-
     def linked(self) -> None:
         """Called once when everything in ``wait_for`` has matched, in both directions."""
 
