@@ -14,7 +14,6 @@ from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlMode, StepResult
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.nodes.estimates import tested_message
 from stiction_ros.nodes.shared.managed import (
     LATCHED_QOS,
     LATCHED_READER_QOS,
@@ -25,6 +24,7 @@ from stiction_ros.nodes.shared.managed import (
 from stiction_ros.nodes.shared.messages import (
     SECOND,
     diagnosis,
+    friction_message,
     joint_state,
     measured_of,
     rows_of,
@@ -267,9 +267,14 @@ class ControllerNode(ManagedNode):
         test = self.live.test
         if test is None or test.judgement is None:
             return
-        self._stiction.publish(tested_message(self.stamp, test.facts.valve, test.judgement))
-        told = json_text(test.judgement.to_dict(), indent=None)
-        self.report([("valve_test", test.judgement.sentence, [("judgement", told)])])
+        found, valve = test.judgement, test.facts.valve
+        rows = {
+            f"{valve}.f_s": (found.f_s, *found.f_s_interval),
+            f"{valve}.f_d": (found.f_d, *found.f_d_interval),
+        }
+        self._stiction.publish(friction_message(self.stamp, ControlMode.VALVE_TEST, rows))
+        told = json_text(found.to_dict(), indent=None)
+        self.report([("valve_test", found.sentence, [("judgement", told)])])
 
     # ---- lockstep --------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 import time
 from collections import Counter, deque
+from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
 from typing import Any
@@ -16,27 +17,23 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
 from stiction_ros.loop import LoopModel
-from stiction_ros.nodes.estimates import (
-    figures_of,
-    finding_status,
-    fit_status,
-    friction_message,
-    look_status,
-    monitor_status,
-    verdicts_of,
-)
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
-from stiction_ros.nodes.shared.messages import SECOND, to_ns, values_of
+from stiction_ros.nodes.shared.messages import SECOND, friction_message, to_ns, values_of
 from stiction_ros.nodes.shared.peers import PLANTS
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.online.health import stopped_after
+from stiction_ros.online.monitor.gap_finding import GapFinding
+from stiction_ros.online.monitor.gap_monitor import GapLook
 from stiction_ros.online.monitor.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.online.pairing import NEW_RUN, PairedSample
+from stiction_ros.texts import json_text
 
 COUNTED = ("bridged", "repeated", "stale", "future")
 SHOWN_AGAIN = 3.0  # s: a plant in lockstep shows its sample each second
+FIGURES = ("gap", "baseline", "growth", "limit", "free_run_rmse", "noise_floor")  # of an output
+Keys = list[tuple[str, object]]
 
 
 class EstimatorNode(ManagedNode):
@@ -260,3 +257,70 @@ class EstimatorNode(ManagedNode):
         self._said = f"last window: {verdicts_of(update)}"
         self.log.info(f"window to sample {update.end}: {figures_of(update)}")
         self.report([fit_status(stamp, update)])
+
+
+def fit_status(stamp: int, update: FitUpdate) -> tuple[str, str, Keys]:
+    """Return task, message and key-values of one fit, which is told once."""
+    keys: Keys = [("window_end", stamp)]
+    for name, friction in update.trusted.items():
+        keys.append((f"{name}.trusted_law", friction.law))
+        keys += [(f"{name}.trusted_{key}", value) for key, value in friction.figures().items()]
+    keys.append(("identification", json_text(update.identification.to_dict(), indent=None)))
+    return "fit", verdicts_of(update), keys
+
+
+def verdicts_of(update: FitUpdate) -> str:
+    """Return the verdicts of one fit in one line."""
+    return ", ".join(f"{v.name} {v.verdict}" for v in update.identification.valves)
+
+
+def figures_of(update: FitUpdate) -> str:
+    """Return verdicts and frictions of one fit in one line, % of travel."""
+    frictions = [
+        f"{v.name}.f_s {v.static_friction:.3g}, {v.name}.f_d {v.dynamic_friction:.3g}"
+        for v in update.identification.valves
+    ]
+    return f"{verdicts_of(update)}; {', '.join(frictions)}"
+
+
+def monitor_status(
+    monitoring: Monitoring, stamp_of: Callable[[int], int]
+) -> tuple[str, str, str, Keys]:
+    """Return level, task, message and key-values of the monitor's own status.
+
+    Args:
+        monitoring: of the node.
+        stamp_of: gives the stamp of a sample, ns.
+    """
+    look, finding = monitoring.look, monitoring.finding
+    keys: Keys = [
+        ("looks", monitoring.looks),
+        ("grown_looks", monitoring.grown),
+        ("runs", monitoring.runs),
+        ("running", monitoring.running),
+    ]
+    if look is not None:
+        keys.append(("window_end", stamp_of(look.end)))
+        for output in look.outputs:
+            keys += [(f"{output.name}.{key}", getattr(output, key)) for key in FIGURES]
+    if finding is not None:
+        keys += [
+            ("verdict", finding.word),
+            ("effects", "; ".join(finding.effects)),
+            ("experiment", finding.document.get("experiment", "")),
+            ("verdict_window_end", stamp_of(finding.end)),
+        ]
+    troubled = look is not None and (look.grown or bool(look.failure))
+    return "warn" if troubled else "ok", "monitor", monitoring.text, keys
+
+
+def look_status(look: GapLook, stamp_of: Callable[[int], int]) -> tuple[str, str, Keys]:
+    """Return task, message and key-values of one measurement, which is told once."""
+    keys: Keys = [("window_end", stamp_of(look.end))]
+    return "gap", look.text, [*keys, ("look", json_text(look.to_dict(), indent=None))]
+
+
+def finding_status(found: GapFinding, stamp_of: Callable[[int], int]) -> tuple[str, str, Keys]:
+    """Return task, message and key-values of what was found, which is told once."""
+    keys: Keys = [("window_begin", stamp_of(found.begin)), ("window_end", stamp_of(found.end))]
+    return "finding", found.text, [*keys, ("finding", json_text(found.to_dict(), indent=None))]

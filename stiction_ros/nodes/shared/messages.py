@@ -3,7 +3,7 @@
 import importlib
 import itertools
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,6 +66,20 @@ def measured_of(message: JointState, names: Sequence[str]) -> FloatArray | None:
         return None
     found = dict(zip(message.name, message.position, strict=False))
     return np.array([found.get(name, np.nan) for name in names], dtype=float)
+
+
+def friction_message(
+    stamp: int, by: str, rows: Mapping[str, tuple[float, float, float]]
+) -> JointState:
+    """Return value, lower and upper end of every friction; empty for an unusable window.
+
+    The ``stamp`` is the end of the window, ns; ``by`` is ``valid_from`` of the loop model in force.
+    """
+    message = joint_state(stamp, list(rows), [value for value, _, _ in rows.values()])
+    message.velocity = [low for _, low, _ in rows.values()]
+    message.effort = [high for _, _, high in rows.values()]
+    message.header.frame_id = by
+    return message
 
 
 def trajectory(
