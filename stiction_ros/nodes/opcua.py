@@ -7,13 +7,12 @@ from typing import Any
 
 from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.nodes.opcua_topics import LoopTopics, grant_keys
-from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.shared.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import to_ns, values_of
 from stiction_ros.online.plain_settings import OpcuaNodeSettings
 from stiction_ros.opcua import require_asyncua
@@ -92,16 +91,8 @@ class OpcuaNode(ManagedNode):
             self.commander(tags.namespace),
             identity,
         )
-        self.bridges[name] = LoopBridge(tags, rules, time.monotonic())
-        readers = ("controller", "estimator")
-        self._topics[name] = LoopTopics(
-            tags,
-            pv=self.outlet(JointState, f"{prefix}pv", SIGNAL_QOS, readers),
-            applied=self.outlet(JointState, f"{prefix}op_applied", SIGNAL_QOS),
-            sp=self._outlet_if(any(one.sp for one in tags.outputs), f"{prefix}sp"),
-            dv=self._outlet_if(bool(tags.disturbances), f"{prefix}dv"),
-            grant=self.outlet(String, f"{prefix}grant", LATCHED_QOS) if writes else None,
-        )
+        bridge = self.bridges[name] = LoopBridge(tags, rules, time.monotonic())
+        self._topics[name] = LoopTopics(self, bridge)
         for tag in tags.read_tags():
             self._by_tag.setdefault(tag, []).append(name)
         if writes:
@@ -113,9 +104,6 @@ class OpcuaNode(ManagedNode):
                 self.create_service(Trigger, f"{prefix}ask_grant", ask),
                 self.create_service(Trigger, f"{prefix}give_back_grant", back),
             ]
-
-    def _outlet_if(self, there: bool, topic: str) -> Any:
-        return self.outlet(JointState, topic, SIGNAL_QOS, ("controller",)) if there else None
 
     def configuration(self) -> dict[str, Any]:
         return {"url": self._url, "bridged": [tags.loop for tags in self._loops]}
@@ -171,7 +159,7 @@ class OpcuaNode(ManagedNode):
         now = time.monotonic()
         found = []
         for name, topics in self._topics.items():
-            level, text, values = topics.health(self.bridges[name], now)
+            level, text, values = topics.health(now)
             if level != "ok" or len(self.bridges) <= TOLD:
                 found.append((level, f"loop {name}", text, values))
         return found
@@ -246,7 +234,7 @@ class OpcuaNode(ManagedNode):
     def _tell_grants(self) -> None:
         """Publish every grant that has changed."""
         for name in self._writes:
-            grant = self._topics[name].changed_grant(self.bridges[name])
+            grant = self._topics[name].changed_grant()
             if grant is not None:
                 self.log.info(f"loop {name}: {grant.state.value}, {grant.reason}")
                 self.report([(f"grant {name}", grant.state.value, grant_keys(grant))])
