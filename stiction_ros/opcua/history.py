@@ -201,18 +201,8 @@ async def _fetch_tag(client: "Client", node: "ua.NodeId", file: HistoryFile, spa
 
 async def _in_force(where: Any, begin: int) -> list[TagReading]:
     """Return the last value before ``begin``, read backwards: it holds until the next one."""
-    from asyncua import ua
-
-    details = ua.ReadRawModifiedDetails(
-        IsReadModified=False,
-        StartTime=_moment(begin - 1000),
-        EndTime=EPOCH,
-        NumValuesPerNode=1,
-        ReturnBounds=False,
-    )
-    result = await where.history_read(details)
-    result.StatusCode.check()
-    found = [reading_of(value, first=False) for value in result.HistoryData.DataValues]
+    values = await where.read_raw_history(_moment(begin - 1000), EPOCH, 1, return_bounds=False)
+    found = [reading_of(value, first=False) for value in values]
     return [one for one in found if 0 < one.stamp < begin][:1]
 
 
