@@ -21,11 +21,7 @@ from stiction_ros.paper.controllers.augmented_cost import (
     printed_frictions,
 )
 from stiction_ros.paper.controllers.searched_start import SearchedStart
-from stiction_ros.paper.controllers.smoothed_programme import (
-    ProgrammeStatus,
-    SmoothedProgramme,
-    SoftOutputs,
-)
+from stiction_ros.paper.controllers.smoothed_programme import SmoothedProgramme, SoftOutputs
 from stiction_ros.paper.controllers.weights import PaperTuning, WarmStart
 from stiction_ros.processes import LinearModel
 
@@ -42,7 +38,6 @@ class PrintedPlan(Plan):
     """A plan, and what it was chosen from."""
 
     choice: Choice  # the sequence with the lower cost (22) under the hard model (4)
-    programme: ProgrammeStatus  # how IPOPT ended
     iterations: int  # of IPOPT
     programme_cost: float  # programme_cost, warm_start_cost: (22), hard model; inf for none
     warm_start_cost: float
@@ -103,7 +98,6 @@ class PrintedEmbeddingMpc(Formulation):
             self.cost.beyond(situation, stems).max(axis=0),
             self._jumps(stems, last),
             choice=choice,
-            programme=found.status,
             iterations=found.iterations,
             programme_cost=cost,
             warm_start_cost=start_cost,

@@ -1,7 +1,6 @@
 """The paper's stiction-embedding programme: (17)-(18) smoothed by (6), cost (22), by IPOPT."""
 
 import dataclasses
-import enum
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,24 +11,14 @@ from stiction_ros.paper.controllers.augmented_cost import PlanProblem, PrintedFr
 from stiction_ros.paper.controllers.weights import PaperTuning
 from stiction_ros.processes import LinearModel
 
-
-class ProgrammeStatus(enum.StrEnum):
-    """How IPOPT ended."""
-
-    SOLVED = "solved"
-    LIMIT = "limit"  # iterations used up; what was reached is kept
-    FAILED = "failed"
-
-
-_SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
-_LIMIT = "Maximum_Iterations_Exceeded"
+KEPT = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Maximum_Iterations_Exceeded")
+"""IPOPT's words for an end whose answer is kept."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ProgrammeResult:
     """What IPOPT found."""
 
-    status: ProgrammeStatus  # how it ended
     op: FloatArray | None  # u over the horizon, shape (N, m), %, in the limits; None when failed
     cost: float  # (22) under the smoothed model; inf when failed
     iterations: int  # number of them
@@ -164,11 +153,10 @@ class SmoothedProgramme:
         stats = self._solver.stats()
         found = np.array(solution["x"]).reshape(self._shape)[:, : op.shape[1]]
         cost, iterations = float(solution["f"]), int(stats["iter_count"])
-        status = _status(stats["return_status"])
-        if status is ProgrammeStatus.FAILED or not np.isfinite(found).all():
-            return ProgrammeResult(ProgrammeStatus.FAILED, None, float("inf"), iterations)
+        if stats["return_status"] not in KEPT or not np.isfinite(found).all():
+            return ProgrammeResult(None, float("inf"), iterations)
         inside = np.clip(found, self._limits[:, 0], self._limits[:, 1])
-        return ProgrammeResult(status, inside, cost, iterations)
+        return ProgrammeResult(inside, cost, iterations)
 
     def _guess(self, situation: PlanProblem, op: FloatArray, stems: FloatArray) -> FloatArray:
         """Return all unknowns of the start, simulated, shape (N (m + s + n),)."""
@@ -182,12 +170,6 @@ class SmoothedProgramme:
         moves = np.diff(np.vstack([situation.stem[self._sticky], stuck]), axis=0)
         turns = np.sign(moves[:, self._directed])
         return np.hstack([op, stuck, turns, states]).reshape(-1)
-
-
-def _status(text: str) -> ProgrammeStatus:
-    if text in _SOLVED:
-        return ProgrammeStatus.SOLVED
-    return ProgrammeStatus.LIMIT if text == _LIMIT else ProgrammeStatus.FAILED
 
 
 def _excess(pv: Any, soft: SoftOutputs) -> Any:
