@@ -100,8 +100,8 @@ def _normal_equations(columns: FloatArray, target: FloatArray) -> tuple[bool, Fl
 
 def projector(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the columns, shape (n, r), numerical dependence left out."""
-    if not columns.shape[1]:
-        return columns
+    if not columns.size:
+        return columns[:, :0]
     basis, left, _ = qr(columns / _lengths(columns), mode="economic", pivoting=True)
     sizes = np.abs(np.diag(left))
     return np.ascontiguousarray(basis[:, : int(np.sum(sizes > DEPENDENT * sizes[0]))])

@@ -55,16 +55,16 @@ def _stays(pv: FloatArray, step: float) -> float:
     """Return how likely white noise leaves a rounded value as it is, where that is likeliest.
 
     The variance of the noise is what two changes in succession take back of each other (Roll 1984,
-    J. Finance 39, 1127), beside two that are farther apart and share the trend alone, less that of
-    rounding.
+    J. Finance 39, 1127), less that of rounding. What two that are farther apart have in common is a
+    trend, which hides some of it.
 
     Args:
         pv: shape (N,).
         step: of rounding.
     """
     changes = np.diff(pv)
-    shared = changes[2:] @ changes[:-2] - changes[1:] @ changes[:-1]
-    variance = float(shared) / len(changes) - step**2 / 12.0
+    trend = max(float(changes[2:] @ changes[:-2]), 0.0)
+    variance = (trend - float(changes[1:] @ changes[:-1])) / len(changes) - step**2 / 12.0
     return math.erf(step / math.sqrt(8.0 * variance)) if variance > 0.0 else 1.0
 
 
