@@ -39,7 +39,7 @@ class UnitReport:
         """``ok`` where a controller was swapped and its loop could be scored before and after."""
         if not self.swapped:
             return PhaseStatus.NO_SWAP.value
-        return self.stories[self.swapped].phases.status.value
+        return "ok" if (found := self.stories[self.swapped].phases).after else found.status.value
 
 
 def unit_report(logs: Mapping[str, RunLog], scenario: UnitScenario) -> UnitReport:
