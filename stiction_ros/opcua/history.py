@@ -16,7 +16,7 @@ from stiction_ros.intake.modes import AUTOMATIC
 from stiction_ros.opcua.loop_bridge import mode_text
 from stiction_ros.opcua.sampling import JITTER, TagQuality, TagReading
 from stiction_ros.opcua.security import Credentials
-from stiction_ros.opcua.session import ANSWER, EPOCH, node_ids, open_client, reading_of
+from stiction_ros.opcua.session import ANSWER, EPOCH, describe, node_ids, open_client, reading_of
 from stiction_ros.opcua.tag_map import LoopTags
 from stiction_ros.records import Record
 from stiction_ros.records.record import Quality
@@ -144,8 +144,6 @@ async def fetch(
         InputError: the server cannot be reached, refuses, or keeps no history of a tag.
     """
     from asyncua import ua
-
-    from stiction_ros.opcua.session import describe
 
     try:
         client = await open_client(url, credentials)
