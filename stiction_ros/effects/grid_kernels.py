@@ -7,7 +7,7 @@ where it rests, both of shape (G,); it returns outputs of shape (N, G).
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.seen import FloatArray
 
 
 @compiled
