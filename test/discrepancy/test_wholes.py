@@ -4,7 +4,6 @@ import pytest
 from gap_loops import loop, record, with_cause
 
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
-from stiction_ros.discrepancy.answer.preview import preview
 from stiction_ros.discrepancy.answer.say import look_at_stems
 from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.process.change import changed_process
@@ -77,22 +76,6 @@ def test_no_effect_is_both_named_and_untestable() -> None:
     answer = found("process:PV1")
     named = {(e.place, e.effect) for e in answer.effects} | set(answer.alternatives)
     assert not named & {(t.place, t.effect) for t in answer.untestable}
-
-
-@pytest.mark.trial
-def test_the_preview_shows_rivals_that_differ_in_the_stem() -> None:
-    shown = preview(found("process:PV1"))
-    assert shown is not None
-    stems = {rival.place: rival.stem for rival in shown.rivals}
-    assert float(abs(stems["valve:V1"] - stems["process:PV1"]).max()) > 1.0
-    for rival in shown.rivals:
-        assert rival.pv == pytest.approx(shown.rivals[0].pv, abs=0.5)
-
-
-def test_nothing_is_previewed_where_nothing_is_in_doubt() -> None:
-    answer = find_discrepancy(loop(), [record(loop(), seed=4)], QUICK)
-    assert answer.verdict is GapVerdict.NONE
-    assert preview(answer) is None
 
 
 def test_a_recorded_stem_says_what_its_valve_does() -> None:
