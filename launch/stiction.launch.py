@@ -41,12 +41,12 @@ def nodes_of(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     scenario = find(given["scenario"])
     speed = None if given["speed"] == "max" else float(given["speed"])
     if given["opcua"]:
-        nodes = bridged_nodes(scenario, directory, speed=speed or 1.0, source="topic:pv")
+        nodes = bridged_nodes(scenario, directory, "topic:pv", speed=speed or 1.0)
     else:
         seed = int(given["seed"]) if given["seed"] else None
         nodes = loop_nodes(scenario, directory, seed=seed, speed=speed)
     parameters = directory / "parameters.yaml"
-    write_parameters(nodes, parameters, any_namespace=True)
+    write_parameters(nodes, parameters)
     files = dict.fromkeys(nodes, parameters)
     if given["opcua"]:
         files["opcua"] = Path(given["opcua"]).resolve()

@@ -1,6 +1,7 @@
 """``stiction demo``: a live loop from limit cycle to compensation, recorded and reported."""
 
 import argparse
+import os
 import shutil
 import signal
 import sys
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from stiction_ros.cli import extensions
 from stiction_ros.cli.shared.node_processes import NodeError, NodeProcesses, require_ros
 from stiction_ros.cli.shared.progress import Bar, bar
-from stiction_ros.cli.shared.scenarios import SCENARIOS, find, loop_nodes
+from stiction_ros.cli.shared.scenarios import ALL, SCENARIOS, find, loop_nodes
 from stiction_ros.errors import InputError, storing
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def add(commands: Any) -> None:
         "scenario",
         nargs="*",
         metavar="SCENARIO",
-        help="tank, siso, neighbours, cascade, or a file (default: tank and siso)"
+        help=f"{', '.join(ALL)}, or a file (default: {' and '.join(SCENARIOS)})"
         + (OPCUA_HELP if opcua else ""),
     )
     parser.add_argument(
@@ -94,12 +95,13 @@ def _run_scenario(
 ) -> bool:
     """Run one scenario and print its table; return whether it succeeded."""
     from stiction_ros.online.session import Scenario
+    from stiction_ros.records.run.log import read_run
     from stiction_ros.report.run.report import report_run
 
     name = scenario.name
     nodes = loop_nodes(scenario.path, directory, seed=options.seed, speed=options.speed)
     processes = NodeProcesses(nodes, directory)
-    begin = time.monotonic()
+    load, begin = os.getloadavg()[0], time.monotonic()
     try:
         try:
             processes.start()
@@ -114,7 +116,8 @@ def _run_scenario(
     show(0.92, f"{name}: reporting")
     if not isinstance(scenario, Scenario):
         return _report_unit(scenario, directory, seconds)
-    report = report_run(directory / "bag", directory, scenario=scenario, seconds=seconds)
+    log = read_run(directory / "bag")
+    report = report_run(log, directory, scenario=scenario, seconds=seconds, load=load)
     show(1.0)
     _print(report.summary, directory)
     return bool(report.summary["status"] == "ok")
@@ -125,17 +128,20 @@ def _report_unit(scenario: "UnitScenario", directory: Path, seconds: float) -> b
     from rich.console import Console
     from rich.table import Table
 
-    from stiction_ros.report.run.unit import UNIT_COLUMNS, report_unit, unit_rows
+    from stiction_ros.records.run.log import read_runs
+    from stiction_ros.report.page import write_page
+    from stiction_ros.report.run import unit
 
-    report = report_unit(directory / "bag", directory, scenario, seconds)
+    report = unit.unit_report(read_runs(directory / "bag", scenario.members), scenario)
+    page = write_page(directory, unit.unit_page(report), unit.unit_summary(report, seconds))
     console = Console()
     for line in report.found.sentences:
         console.print(f"{scenario.name}: {line}")
-    table = Table(*UNIT_COLUMNS, title=scenario.name, title_justify="left")
-    for row in unit_rows(report):
+    table = Table(*unit.UNIT_COLUMNS, title=scenario.name, title_justify="left")
+    for row in unit.unit_rows(report):
         table.add_row(*(cell if isinstance(cell, str) else cell[1] for cell in row))
     console.print(table)
-    console.print(f"{report.page}")
+    console.print(f"{page}")
     return report.status == "ok"
 
 
@@ -169,7 +175,8 @@ def _print(summary: dict[str, Any], directory: Path) -> None:
     console.print(table)
     if summary["pv_to_op_ms"]:
         times = ", ".join(f"{key} {value:.3g}" for key, value in summary["pv_to_op_ms"].items())
-        console.print(f"{name}: PV to OP in ms: {times}")
+        load = f"load {summary['load_before']:.2f} before the run"
+        console.print(f"{name}: PV to OP in ms: {times}; {load}")
     for topic, count in summary["messages"].items():
         lost = (count["published"] or 0) - count["recorded"]
         if lost > 0:

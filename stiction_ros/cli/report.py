@@ -39,9 +39,11 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.out)
     with storing(out, fix="choose another --out"):
         if is_bag(options.record) and holds_live_run(options.record):
+            from stiction_ros.records.run.log import read_run
             from stiction_ros.report.run.report import report_run
 
-            print(report_run(options.record, out, namespace=options.namespace).page)
+            log = read_run(options.record, namespace=options.namespace)
+            print(report_run(log, out).page)
         else:
             loop = intake.opened(options)
             intake.tell(loop)

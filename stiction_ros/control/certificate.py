@@ -1,7 +1,5 @@
 """How far a plan of the embedding is from the best that any pattern of jumps can do."""
 
-import dataclasses
-import enum
 from collections.abc import Sequence
 
 import daqp
@@ -11,48 +9,12 @@ from stiction_ros.control.embedding_problem import FREE, StickyState
 from stiction_ros.control.horizon import HorizonCost, HorizonLimits
 from stiction_ros.control.horizon_qp import HorizonQp
 from stiction_ros.control.pattern_bounds import jump_sizes
-from stiction_ros.control.result import Plan
 from stiction_ros.control.target import Target
 from stiction_ros.effects.behaviour import FloatArray
 
 BINARY = 16  # a bound of daqp that must be active on one side
 CURVATURE = 1e-3  # of the binaries; their linear terms take it off at 0 and 1
 ITERATION_LIMIT = 2_000_000
-
-
-class CertificateStatus(enum.StrEnum):
-    """Whether the mixed-integer optimum was found."""
-
-    CERTIFIED = "certified"
-    UNSOLVED = "unsolved"  # branch and bound found none within its limits
-    UNBOUNDED_TRAVEL = "unbounded_travel"  # a sticky valve without limits has no big M
-
-
-@dataclasses.dataclass(frozen=True)
-class Certificate:
-    """The mixed-integer optimum beside a plan."""
-
-    status: CertificateStatus  # whether the optimum is known
-    optimum: float  # its cost, in the units of (19a), NaN when not known
-    gap: float  # cost of the plan above it as a share of it; not below 0; NaN when not known
-    samples: int  # of the horizon in which jumps were free
-    nodes: int  # of the search tree
-
-
-def certify(problem: "FreeJumps", state: FloatArray, target: Target, plan: Plan) -> Certificate:
-    """Return how far ``plan``, made at ``state`` and ``target``, is from the optimum."""
-    nan = float("nan")
-    if not problem.bounded:
-        return Certificate(CertificateStatus.UNBOUNDED_TRAVEL, nan, nan, problem.samples, 0)
-    value, nodes = problem.solve(state, target)
-    if value is None:
-        return Certificate(CertificateStatus.UNSOLVED, nan, nan, problem.samples, nodes)
-    cost, last = problem.cost, problem.valves.last
-    fixed = cost.constant(state - target.state, last - target.stem, target.path)
-    optimum = value + fixed
-    above = max(plan.cost - optimum, 0.0)
-    gap = above / max(optimum, 1e-9 * (1.0 + abs(fixed)))
-    return Certificate(CertificateStatus.CERTIFIED, optimum, gap, problem.samples, nodes)
 
 
 class FreeJumps:
@@ -105,11 +67,6 @@ class FreeJumps:
         rows = np.vstack([self._rates(), self._jumps()])
         self.qp = HorizonQp(cost, shape, rows, limits.output)
 
-    @property
-    def bounded(self) -> bool:
-        """Whether every sticky valve has limits: a big M needs them."""
-        return bool(np.isfinite(self.limits.stem[self.sticky]).all())
-
     def _rates(self) -> FloatArray:
         rows = []
         for j, sticky in enumerate(self._is_sticky):
@@ -145,20 +102,23 @@ class FreeJumps:
                 rows += [upper, lower, one, high, low]
         return np.array(rows).reshape(-1, self.size)
 
-    def solve(self, state: FloatArray, target: Target) -> tuple[float | None, int]:
-        """Return the optimum from ξ̂, (n,), without the cost's constant part, and the nodes."""
+    def optimum(self, state: FloatArray, target: Target) -> float | None:
+        """Return the least cost from ξ̂, (n,), in the units of (19a); None where it is not found.
+
+        A sticky valve without limits has no big M.
+        """
+        if not np.isfinite(self.limits.stem[self.sticky]).all():
+            return None
         lower, upper = self._bounds(target)
-        deviation = self.valves.last - target.stem
-        problem = self.qp.problem(
-            state - target.state, deviation, lower, upper, target.pv, target.path
-        )
-        hessian, linear = problem.hessian.copy(), problem.linear.copy()
+        z, deviation = state - target.state, self.valves.last - target.stem
+        problem, linear = self.qp.problem(z, deviation, lower, upper, target.pv, target.path)
+        hessian = problem.hessian.copy()
         binaries = np.arange(self.stems, self.size)
         hessian[binaries, binaries] += CURVATURE
         linear[binaries] += self.jump_price - 0.5 * CURVATURE
         sense = np.zeros(len(problem.upper), dtype=np.int32)
         sense[binaries] = BINARY
-        _, value, flag, info = daqp.solve(
+        _, value, flag, _ = daqp.solve(
             hessian,
             linear,
             problem.matrix,
@@ -167,7 +127,9 @@ class FreeJumps:
             sense,
             iter_limit=ITERATION_LIMIT,
         )
-        return (float(value) if flag >= 1 else None), int(info["nodes"])
+        if flag < 1:
+            return None
+        return float(value) + self.cost.constant(z, deviation, target.path)
 
     def _bounds(self, target: Target) -> tuple[FloatArray, FloatArray]:
         limits, horizon = self.limits, self.cost.horizon

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.control.belief import ValveBeliefs, jump_form
-from stiction_ros.control.certificate import Certificate, CertificateStatus, FreeJumps, certify
+from stiction_ros.control.certificate import FreeJumps
 from stiction_ros.control.embedding_problem import EmbeddingProblem, JumpPattern, StickyState
 from stiction_ros.control.formulation import Formulation
 from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonWeights
@@ -23,7 +23,7 @@ from stiction_ros.processes import LinearModel
 
 # Samples between two opposite jumps, by the number of sticky valves: patterns multiply.
 SECOND_JUMPS = {1: (1, 2, 3, 5, 8), 2: (1, 2, 5), 3: (2,)}
-ROUNDING = 1e-9  # of the cost, by which a bound must exceed it
+ROUNDING = 1e-9  # of the cost, by which a bound must exceed it, and the least scale of a gap
 # Samples that a single valve may wait before its first jump, and what may follow then.
 WAITS = (1,)
 WAITING_SECONDS = (0, 1)
@@ -208,7 +208,7 @@ class EmbeddingMpc(Formulation):
             problem = self._problems[i]
             solution = problem.solve(state, target, valves, gradient)
             self.solved += 1
-            converged = converged and not problem.limit_reached
+            converged = converged and not problem.qp.limit_reached
             if solution is None:
                 continue
             cost = solution.cost + self.tuning.jump_price * problem.jumps
@@ -230,17 +230,19 @@ class EmbeddingMpc(Formulation):
     ) -> float | None:
         if self.waits:
             return None  # not the cheapest plan, and not meant to be
-        found = self.certificate(state, target, last, plan, samples)
-        return found.gap if found.status is CertificateStatus.CERTIFIED else None
+        optimum = self.optimum(state, target, last, samples)
+        if optimum is None:
+            return None
+        return max(plan.cost - optimum, 0.0) / max(optimum, ROUNDING * (1.0 + abs(plan.cost)))
 
-    def certificate(
-        self, state: FloatArray, target: Target, last: FloatArray, plan: Plan, samples: int
-    ) -> Certificate:
-        """Return how far the ``plan`` is from the best of any jumps in the first samples."""
+    def optimum(
+        self, state: FloatArray, target: Target, last: FloatArray, samples: int
+    ) -> float | None:
+        """Return the least cost of any jumps in the first samples, None where it is not found."""
         sticky = [form is not None for form in self.forms]
         price = self.tuning.jump_price
-        jumps = FreeJumps(self.cost, self.limits, self.valves(last), sticky, price, samples)
-        return certify(jumps, state, target, plan)
+        free = FreeJumps(self.cost, self.limits, self.valves(last), sticky, price, samples)
+        return free.optimum(state, target)
 
     def op_of(self, last: FloatArray, stem: FloatArray) -> FloatArray:
         """Return the OP (m,), %, that moves the stems from ``last`` (m,) to ``stem`` (m,)."""

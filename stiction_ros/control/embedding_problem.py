@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.control.horizon import HorizonCost, HorizonLimits
-from stiction_ros.control.horizon_qp import HorizonQp, HorizonSolution, SharedTerms
+from stiction_ros.control.horizon_qp import HorizonQp, HorizonSolution
 from stiction_ros.control.target import Target
 from stiction_ros.effects.behaviour import FloatArray
 
@@ -84,14 +84,9 @@ class EmbeddingProblem:
         self._curved = cost.hessian @ self._anchors
         self._free = np.full((2, shape.shape[1] + len(rows)), FREE)
         self._free[0] = -FREE
-        self._qp = HorizonQp(
+        self.qp = HorizonQp(
             cost, np.ascontiguousarray(shape), matrix, limits.output, limits.iterations
         )
-
-    @property
-    def limit_reached(self) -> bool:
-        """Whether the last solve ended for want of iterations."""
-        return self._qp.limit_reached
 
     def _column(self, valve: int, first: int, last: int) -> FloatArray:
         column = np.zeros((self._horizon, self._width))
@@ -111,21 +106,20 @@ class EmbeddingProblem:
         """
         deviation = valves.last - target.stem
         if gradient is None:
-            gradient = self._qp.cost.linear(state - target.state, deviation, target.path)
+            gradient = self.qp.cost.linear(state - target.state, deviation, target.path)
         lower, upper = self._bounds(target, valves)
-        return self._qp.solve(
+        return self.qp.solve(
             state - target.state,
-            deviation,
-            self._anchors @ deviation,
+            gradient,
             lower,
             upper,
             target.pv,
-            target.path,
-            SharedTerms(gradient, self._curved @ deviation),
+            self._anchors @ deviation,
+            self._curved @ deviation,
         )
 
     def _bounds(self, target: Target, valves: StickyState) -> tuple[FloatArray, FloatArray]:
-        size = self._qp.size
+        size = self.qp.size
         lower, upper = self._free.copy()
         row = size
         for j, pattern in enumerate(self.combination):

@@ -20,30 +20,10 @@ class HorizonSolution:
     plan: FloatArray  # stems in deviations from the target, shape (N, m)
     cost: float  # of the plan
     slack: FloatArray  # by how much outputs break their soft bounds at most, shape (p,)
-    variables: FloatArray  # r
     pv: FloatArray | None = None  # outputs at 1 … N, shape (N, p), if soft bounds asked for them
 
 
-@dataclasses.dataclass(frozen=True)
-class SharedTerms:
-    """Products that several programmes of one step share."""
-
-    gradient: FloatArray  # of ``HorizonCost.linear``, shape (N m,)
-    curved: FloatArray  # Hessian times the offset, shape (N m,)
-
-
-@dataclasses.dataclass(frozen=True)
-class QpData:
-    """min x'Hx/2 + f'x with bounds on x and then on the rows A x, as daqp takes it."""
-
-    hessian: FloatArray
-    linear: FloatArray
-    matrix: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-
-
-class _Programme:
+class Programme:
     """min x'Hx/2 + f'x with bounds on x and then on the rows A x; only vectors change."""
 
     def __init__(self, hessian: FloatArray, matrix: FloatArray, iterations: int) -> None:
@@ -112,10 +92,10 @@ class HorizonQp:
         self._output_bounds = output_bounds[self._bounded]
         self._lowest, self._highest = output_bounds[:, 0], output_bounds[:, 1]
         self._slack_weight = slack_weights(cost)[self._bounded]
-        self._hard = _Programme(shape.T @ cost.hessian @ shape, rows, iterations)
+        self._hard = Programme(shape.T @ cost.hessian @ shape, rows, iterations)
 
     @functools.cached_property
-    def _soft(self) -> _Programme:
+    def _soft(self) -> Programme:
         """The programme with soft bounds: a slack more for each bounded output."""
         size, slacks, horizon = self.size, len(self._bounded), self.cost.horizon
         hessian = np.zeros((size + slacks, size + slacks))
@@ -129,37 +109,35 @@ class HorizonQp:
             block[..., :size] = output_rows
             block[:, range(slacks), range(size, size + slacks)] = -sign
             blocks.append(block.reshape(horizon * slacks, size + slacks))
-        programme = _Programme(hessian, np.vstack(blocks), self._iterations)
+        programme = Programme(hessian, np.vstack(blocks), self._iterations)
         programme.lower[size : size + slacks] = 0.0
         return programme
 
     def solve(
         self,
         state: FloatArray,
-        last: FloatArray,
-        offset: FloatArray,
+        gradient: FloatArray,
         lower: FloatArray,
         upper: FloatArray,
         target_pv: FloatArray,
-        path: FloatArray | None = None,
-        shared: SharedTerms | None = None,
+        offset: FloatArray | None = None,
+        curved: FloatArray | None = None,
     ) -> HorizonSolution | None:
         """Return the best plan, or None when there is none.
 
         Args:
             state: ξ̂ − ξ_ss, shape (n,).
-            last: χ₋₁ − χ_ss, shape (m,).
-            offset: v₀, shape (N m,).
+            gradient: by :meth:`HorizonCost.linear`, shape (N m,).
             lower, upper: bounds on r and then on the further rows, shape (r + c,).
             target_pv: outputs at the target, shape (p,), about which soft bounds are written.
-            path: as in :meth:`HorizonCost.linear`.
-            shared: products that the caller has already; None computes them.
+            offset: v₀, shape (N m,); None for 0.
+            curved: H v₀, shape (N m,), with an offset.
         """
         self.limit_reached = False
-        gradient = self.cost.linear(state, last, path) if shared is None else shared.gradient
         base = 0.0
-        if shared is not None or offset.any():
-            curved = self.cost.hessian @ offset if shared is None else shared.curved
+        if offset is None or curved is None:
+            offset = np.zeros(len(gradient))
+        else:
             base = float(offset @ (0.5 * curved + gradient))
             gradient = gradient + curved
         linear = self.shape.T @ gradient
@@ -168,7 +146,7 @@ class HorizonQp:
         if self.size == 0:
             plan = offset.reshape(self.cost.horizon, -1)  # nothing is left to decide
             slack = self.slack(state, plan, target_pv)
-            return HorizonSolution(plan, base + self.slack_cost(slack), slack, np.zeros(0))
+            return HorizonSolution(plan, base + self.slack_cost(slack), slack)
         self._hard.lower[:], self._hard.upper[:] = lower, upper
         found = self._solved(self._hard, linear)
         if found is None:
@@ -187,9 +165,9 @@ class HorizonQp:
             slack[self._bounded] = found[0][self.size :]
             plan = (self.shape @ variables + offset).reshape(self.cost.horizon, -1)
             pv = None
-        return HorizonSolution(plan, value + base, slack, variables, pv)
+        return HorizonSolution(plan, value + base, slack, pv)
 
-    def _solved(self, programme: _Programme, linear: FloatArray) -> tuple[FloatArray, float] | None:
+    def _solved(self, programme: Programme, linear: FloatArray) -> tuple[FloatArray, float] | None:
         found = programme.solve(linear)
         self.limit_reached = programme.limit_reached
         return found
@@ -202,13 +180,12 @@ class HorizonQp:
         upper: FloatArray,
         target_pv: FloatArray,
         path: FloatArray | None = None,
-    ) -> QpData:
-        """Return the problem with its soft bounds, without an offset."""
+    ) -> tuple[Programme, FloatArray]:
+        """Return the problem with its soft bounds and its linear terms, without an offset."""
         linear = np.zeros(self.size + len(self._bounded))
         linear[: self.size] = self.shape.T @ self.cost.linear(state, last, path)
         self._fill_bounds(state, np.zeros(len(self.shape)), lower, upper, target_pv)
-        soft = self._soft
-        return QpData(soft.hessian, linear, soft.matrix, soft.lower, soft.upper)
+        return self._soft, linear
 
     def slack(self, state: FloatArray, plan: FloatArray, target_pv: FloatArray) -> FloatArray:
         """Return by how much ``plan`` (N, m) breaks the soft bounds, shape (p,)."""

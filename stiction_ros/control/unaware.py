@@ -32,7 +32,7 @@ class UnawareMpc(Formulation):
         self._limited, self._width = limited, m
         rows = (np.eye(size) - np.eye(size, k=-m))[picks]
         self._qp = HorizonQp(self.cost, np.eye(size), rows, limits.output, limits.iterations)
-        self._offset = np.zeros(size)
+        self._size = size
         self._lower, self._upper = np.empty(size + len(picks)), np.empty(size + len(picks))
         self._moves = np.tile(limits.move[limited], weights.horizon)
 
@@ -45,18 +45,11 @@ class UnawareMpc(Formulation):
         low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
         deviation = last - target.stem
         self._fill_bounds(low - target.stem, high - target.stem, deviation)
-        solution = self._qp.solve(
-            state - target.state,
-            deviation,
-            self._offset,
-            self._lower,
-            self._upper,
-            target.pv,
-            target.path,
-        )
+        z = state - target.state
+        gradient = self.cost.linear(z, deviation, target.path)
+        solution = self._qp.solve(z, gradient, self._lower, self._upper, target.pv)
         if solution is not None:
-            constant = self.cost.constant(state - target.state, deviation, target.path)
-            cost = solution.cost + constant
+            cost = solution.cost + self.cost.constant(z, deviation, target.path)
             return self._plan(state, target, solution, cost)
         if self._qp.limit_reached:
             return self._cut_plan(state, target, last)
@@ -94,7 +87,7 @@ class UnawareMpc(Formulation):
             v, slack = plan.reshape(-1), self._qp.slack(z, plan, target.pv)
             cost = float(v @ (0.5 * self.cost.hessian @ v + linear))
             cost = cost + self.cost.constant(z, before, target.path) + self._qp.slack_cost(slack)
-            found = HorizonSolution(plan, cost, slack, v)
+            found = HorizonSolution(plan, cost, slack)
             both.append(self._plan(state, target, found, cost, converged=False))
         if not np.isfinite(both[0].cost) or both[0].cost > both[1].cost:
             return None
@@ -102,7 +95,7 @@ class UnawareMpc(Formulation):
 
     def _fill_bounds(self, low: FloatArray, high: FloatArray, deviation: FloatArray) -> None:
         """Write bounds on all stems off the target, then on their limited moves."""
-        size, count = len(self._offset), len(self._limited)
+        size, count = self._size, len(self._limited)
         self._lower[:size].reshape(-1, self._width)[:] = low
         self._upper[:size].reshape(-1, self._width)[:] = high
         if count:

@@ -10,6 +10,7 @@ from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.identification.friction import behaviour_of, find_law, first_values
 from stiction_ros.identification.judgement import Figures, VerdictKind
+from stiction_ros.signals.free_run import driven, fitted_free_run
 
 Interval = tuple[float, float]
 __all__ = ["FitStatus", "Identification", "OrderRow", "OutputModel", "ValveEstimate", "VerdictKind"]
@@ -250,6 +251,15 @@ class OutputModel:
     fit_one_step: float  # NRMSE fit of the one-step prediction with the noise model, %
     fit_free_run: float  # NRMSE fit of the free run, 100 (1 − ‖y − ŷ‖ / ‖y − mean y‖), %
     cause: Cause | None = None  # of its oscillation; None where the loop was not closed again
+
+    def free_run(self, stems: Mapping[str, FloatArray], measured: FloatArray) -> FloatArray:
+        """Return PV, (N,), driven by stems, (N,), %, alone, its start fitted to that measured.
+
+        Infinite throughout where the model is not stable.
+        """
+        delays = [self.delay[valve] for valve in self.b]
+        drive = driven(self.b.values(), delays, [stems[valve] for valve in self.b], self.bias)
+        return fitted_free_run(self.a, drive, measured)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""

@@ -124,13 +124,6 @@ class Section:
         """Return a whole number ≥ low."""
         return int(number(self.raw(key, default), self.at(key), low=low, whole=True))
 
-    def flag(self, key: str, default: Any = _REQUIRED) -> bool:
-        """Return true or false."""
-        value = self.raw(key, default)
-        if not isinstance(value, bool):
-            raise InputError(f"{shown(value)} is neither true nor false", where=self.at(key))
-        return value
-
     def numbers(
         self, key: str, default: Any = _REQUIRED, *, count: int | None = None
     ) -> FloatArray:

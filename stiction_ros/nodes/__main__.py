@@ -39,7 +39,10 @@ def main() -> int:
         signal.signal(number, lambda _number, _frame: os._exit(0))
     name = sys.argv[1]
     sys.argv[:2] = [name]
-    return importlib.import_module(f"stiction_ros.nodes.{name}").main() or 0
+    from stiction_ros.nodes.shared.runner import run
+
+    module = importlib.import_module(f"stiction_ros.nodes.{name}")
+    return run(name, getattr(module, f"{name.capitalize()}Node"))
 
 
 if __name__ == "__main__":

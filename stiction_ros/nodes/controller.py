@@ -1,8 +1,8 @@
 """The controller: pv and sp in, op out; swaps to what the estimator finds."""
 
-import dataclasses
 import time
 from collections import deque
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any
 
 from rclpy.timer import Timer
@@ -12,56 +12,44 @@ from trajectory_msgs.msg import JointTrajectory
 
 from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlMode, StepResult
-from stiction_ros.effects import from_mapping
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.nodes.controller_inputs import ControllerInputs
-from stiction_ros.nodes.estimates import tested_message
-from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
-from stiction_ros.nodes.shared.messages import SECOND, diagnosis, joint_state, to_ns, trajectory
-from stiction_ros.nodes.shared.peers import publishers_of
-from stiction_ros.nodes.shared.runner import run
-from stiction_ros.online.controller.live import LiveController
-from stiction_ros.online.controller.making import thinned_plan
-from stiction_ros.online.controller.settings import LiveControllerSettings
+from stiction_ros.nodes.shared.managed import (
+    LATCHED_QOS,
+    LATCHED_READER_QOS,
+    READER_QOS,
+    SIGNAL_QOS,
+    ManagedNode,
+)
+from stiction_ros.nodes.shared.messages import (
+    SECOND,
+    diagnosis,
+    friction_message,
+    joint_state,
+    measured_of,
+    rows_of,
+    to_ns,
+    trajectory,
+    values_of,
+)
+from stiction_ros.nodes.shared.peers import PLANTS, publishers_of
+from stiction_ros.online.controller.plans import rehearse, thinned_plan
 from stiction_ros.online.controller.testing import ValveTestingController
-from stiction_ros.online.handover.hand_over import AtOnce, Beside
+from stiction_ros.online.handover.hand_over import AtOnce
+from stiction_ros.online.handover.known_friction import read_offer
 from stiction_ros.online.input.port import InputPort
 from stiction_ros.online.input.port_health import PortHealth, keys
-from stiction_ros.online.input.samples import PortRules, Sample
+from stiction_ros.online.input.samples import PortRules, Sample, SetPointPreview
 from stiction_ros.online.node_settings import ControllerNodeSettings
 from stiction_ros.texts import json_text
 
 QUICKEST, SLOWEST = 0.02, 0.25  # s between two looks for samples that are due
-LEARNS = ("auto", "valve_test")
-"""Modes in which the controller waits for the fits of the estimator."""
+LEARNS = ("auto", "valve_test")  # modes in which it waits for the fits of the estimator
 GRAPH_PERIOD = 1.0  # s between two looks at who commands
-STEPS = 3
-MODES = (ControlMode.UNAWARE, ControlMode.EMBEDDING)
-FRICTION = {"effect": "stiction", "law": "he", "f_s": 5.0, "f_d": 2.0}
+DRAINED = ("op_applied", "sp", "dv", "pv")  # what is read to the end before a step, in this order
 
 
-def rehearse(settings: LiveControllerSettings, model: LoopModel) -> None:
-    """Load and warm what a step needs, before and after a swap; nothing is left of it.
-
-    The first step of a process takes ten times as long as those that follow: solvers are
-    loaded, and memory is laid out.
-    """
-    sticky = model.with_valve_effects(
-        {name: [from_mapping(FRICTION)] for name in model.valve_names}
-    )
-    for mode in MODES:
-        try:
-            live = LiveController(dataclasses.replace(settings, mode=mode.value), sticky)
-        except InputError:  # these settings know this friction only; the swap would say why
-            continue
-        for k in range(STEPS):
-            result = live.step(model.pv0, model.pv0 + 0.01 * k)
-        thinned_plan(live.observed, result, 2)
-        live.close()
-
-
-class ControllerNode(ControllerInputs):
+class ControllerNode(ManagedNode):
     """Thin shell around :class:`stiction_ros.online.controller.testing.ValveTestingController`."""
 
     settings: ControllerNodeSettings
@@ -69,17 +57,14 @@ class ControllerNode(ControllerInputs):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("controller", ControllerNodeSettings, **kwargs)
         self._late_timer: Timer | None = None
-        self.listening = False
+        self.listening = False  # whether a PV is for this node: it is active
 
     def configure(self) -> None:
         settings = self.settings
-        if not settings.model:
-            raise InputError(
-                "no loop model", where="controller: model", fix="set it to a *.loop.yaml"
-            )
-        self.model = LoopModel.load(find_config(settings.model))
+        model = self.needed("model", "loop model", "*.loop.yaml")
+        self.model = LoopModel.load(find_config(model))
         lockstep = settings.pace == "lockstep"
-        self.background = AtOnce() if lockstep else Beside()
+        self.background: Executor = AtOnce() if lockstep else ThreadPoolExecutor(1, "beside")
         self.live = ValveTestingController(settings, self.model, self.background)
         if not lockstep:
             rehearse(settings, self.model)
@@ -97,7 +82,9 @@ class ControllerNode(ControllerInputs):
             )
         )
         self._port_health = PortHealth(lockstep)
-        self.fits, self.models, self.reading = {}, {""}, deque()
+        self.fits: dict[int, str] = {}  # end of window -> valid_from of the model in force
+        self.models = {""}  # valid_from of the models that have come
+        self.reading: deque[Future[LoopModel]] = deque()
         self._last_op: JointState | None = None
         self._waiting_since: float | None = None
         self._told = self._doubts = 0
@@ -280,9 +267,14 @@ class ControllerNode(ControllerInputs):
         test = self.live.test
         if test is None or test.judgement is None:
             return
-        self._stiction.publish(tested_message(self.stamp, test.facts.valve, test.judgement))
-        told = json_text(test.judgement.to_dict(), indent=None)
-        self.report([("valve_test", test.judgement.sentence, [("judgement", told)])])
+        found, valve = test.judgement, test.facts.valve
+        rows = {
+            f"{valve}.f_s": (found.f_s, *found.f_s_interval),
+            f"{valve}.f_d": (found.f_d, *found.f_d_interval),
+        }
+        self._stiction.publish(friction_message(self.stamp, ControlMode.VALVE_TEST, rows))
+        told = json_text(found.to_dict(), indent=None)
+        self.report([("valve_test", found.sentence, [("judgement", told)])])
 
     # ---- lockstep --------------------------------------------------------------------------
 
@@ -310,11 +302,91 @@ class ControllerNode(ControllerInputs):
         if len(names) > 1:
             self.notice("commanders", "error", f"op is published by {', '.join(sorted(names))}")
 
+    # ---- messages in -----------------------------------------------------------------------
 
-def main() -> int:
-    """Run the node."""
-    return run("controller", "Model predictive control that learns of stiction.", ControllerNode)
+    def listen(self) -> None:
+        """Subscribe; rclpy serves what is ready in this order."""
+        external = self.settings.sp_source == "external"
+        sp_qos = LATCHED_READER_QOS if external else READER_QOS
+        self._draining = False
+        self.inlet(JointState, "op_applied", self._on_applied, READER_QOS, PLANTS)
+        self.inlet(JointState, "sp", self._on_sp, sp_qos)
+        self.inlet(JointState, "dv", self._on_dv, READER_QOS)
+        self.inlet(JointState, "pv", self._on_pv, READER_QOS, PLANTS)
+        self.inlet(JointTrajectory, "sp_preview", self._on_preview, READER_QOS)
+        self.inlet(JointState, "stiction", self._on_stiction, READER_QOS, ("estimator",))
+        self.inlet(String, "loop_model", self._on_model, LATCHED_READER_QOS, ("estimator",))
 
+    def drain_signals(self) -> None:
+        """Take in what is queued of all signals, so that the newest is known."""
+        self._draining = True
+        try:
+            for topic in DRAINED:
+                self.inlets[topic].drain()
+        finally:
+            self._draining = False
 
-if __name__ == "__main__":
-    raise SystemExit(main())
+    def collect_offers(self) -> None:
+        """Offer the loop models that have been read to the controller, in their order."""
+        while self.reading and self.reading[0].done():
+            try:
+                model = self.reading.popleft().result()
+            except Exception as error:  # whatever is sent, it must not end the loop
+                said = error if isinstance(error, InputError) else type(error).__name__
+                self.log.error(f"a loop model is refused: {said}")
+                continue
+            valid_from = int(model.document.get("valid_from", 0))
+            due = self.port.due(valid_from)
+            if self.settings.pace == "realtime":  # a stamp of an earlier run may be far off
+                due = min(due, self.port.next + self.settings.fit_latency)
+            self.live.offer(model, due)
+            self.models.add(str(valid_from))
+
+    def _on_applied(self, message: JointState) -> None:
+        op = values_of(message, self.model.valve_names)
+        ours = message.header.frame_id in ("", self.get_fully_qualified_name())
+        self.port.add_applied(time.monotonic(), to_ns(message.header.stamp), op, ours)
+
+    def _on_pv(self, message: JointState) -> None:
+        if not self.listening:
+            return
+        stamp = to_ns(message.header.stamp)
+        if not self.is_answered(stamp):
+            self.port.add_pv(time.monotonic(), stamp, measured_of(message, self.model.outputs))
+        self._go()
+
+    def _on_sp(self, message: JointState) -> None:
+        sp = values_of(message, self.model.outputs)
+        self.port.add_sp(time.monotonic(), to_ns(message.header.stamp), sp)
+        self._go_in_lockstep()
+
+    def _on_dv(self, message: JointState) -> None:
+        dv = values_of(message, self.model.process.measured_disturbances)
+        self.port.add_dv(time.monotonic(), to_ns(message.header.stamp), dv)
+        self._go_in_lockstep()
+
+    def _on_preview(self, message: JointTrajectory) -> None:
+        found = rows_of(message, self.model.outputs)
+        preview = None if found is None else SetPointPreview(tuple(found[0]), found[1])
+        self.port.add_preview(preview)
+
+    def _on_stiction(self, message: JointState) -> None:
+        if message.header.frame_id == ControlMode.VALVE_TEST:
+            return  # it is its own
+        if self.settings.pace == "lockstep":  # who waits for nobody need not remember
+            self.fits[to_ns(message.header.stamp)] = message.header.frame_id
+        self._go_in_lockstep()
+
+    def _on_model(self, message: String) -> None:
+        self.reading.append(self.background.submit(read_offer, message.data, self.model))
+        self.collect_offers()
+        self._go_in_lockstep()
+
+    def _go_in_lockstep(self) -> None:
+        """Step: what came may be what a sample of an earlier PV has lacked."""
+        if self.settings.pace == "lockstep":
+            self._go()
+
+    def _go(self) -> None:
+        if not self._draining:
+            self.go()

@@ -2,7 +2,9 @@
 
 import time
 from collections import Counter, deque
+from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,29 +17,23 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
 from stiction_ros.loop import LoopModel
-from stiction_ros.nodes.estimates import (
-    figures_of,
-    finding_status,
-    fit_status,
-    friction_message,
-    look_status,
-    monitor_status,
-    verdicts_of,
-)
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
-from stiction_ros.nodes.shared.messages import SECOND, to_ns, values_of
+from stiction_ros.nodes.shared.messages import SECOND, friction_message, to_ns, values_of
 from stiction_ros.nodes.shared.peers import PLANTS
-from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.shared.typed import trigger
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.online.health import stopped_after
+from stiction_ros.online.monitor.gap_finding import GapFinding
+from stiction_ros.online.monitor.gap_monitor import GapLook
 from stiction_ros.online.monitor.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.online.pairing import NEW_RUN, PairedSample
+from stiction_ros.texts import json_text
 
 COUNTED = ("bridged", "repeated", "stale", "future")
 SHOWN_AGAIN = 3.0  # s: a plant in lockstep shows its sample each second
+FIGURES = ("gap", "baseline", "growth", "limit", "free_run_rmse", "noise_floor")  # of an output
+Keys = list[tuple[str, object]]
 
 
 class EstimatorNode(ManagedNode):
@@ -64,7 +60,7 @@ class EstimatorNode(ManagedNode):
         self._done = self.create_guard_condition(self._collect)
         self._stiction = self.outlet(JointState, "stiction", SIGNAL_QOS, ("controller",))
         self._model = self.outlet(String, "loop_model", LATCHED_QOS, ("controller",))
-        self.inlet(JointState, "op_applied", self._on_applied, READER_QOS)
+        self.inlet(JointState, "op_applied", partial(self._on_op, applied=True), READER_QOS)
         self.inlet(JointState, "op", self._on_op, READER_QOS, ("controller",))
         self.inlet(JointState, "pv", self._on_pv, READER_QOS, PLANTS)
 
@@ -146,17 +142,12 @@ class EstimatorNode(ManagedNode):
             self._outputs = self._outputs or tuple(message.name)
             self._take(self._pairs.add_pv(to_ns(message.header.stamp), pv))
 
-    def _on_op(self, message: JointState) -> None:
+    def _on_op(self, message: JointState, *, applied: bool = False) -> None:
         op = self._values("op", message, self._valves)
         if op is not None:
             self._valves = self._valves or tuple(message.name)
-            self._take(self._pairs.add_op(to_ns(message.header.stamp), op))
-
-    def _on_applied(self, message: JointState) -> None:
-        op = self._values("op", message, self._valves)
-        if op is not None:
-            self._valves = self._valves or tuple(message.name)
-            self._take(self._pairs.add_applied(to_ns(message.header.stamp), op))
+            add = self._pairs.add_applied if applied else self._pairs.add_op
+            self._take(add(to_ns(message.header.stamp), op))
 
     def _values(self, topic: str, message: JointState, names: tuple[str, ...]) -> FloatArray | None:
         """Return the values of ``names``; None, and counted, where a message lacks one.
@@ -207,8 +198,8 @@ class EstimatorNode(ManagedNode):
             future: Future[Any] = Future()
             future.cancel()
             return future
-        future = self._worker.call(work, *arguments)
-        future.add_done_callback(lambda _future: trigger(self._done))
+        future = self._worker.submit(work, *arguments)
+        future.add_done_callback(lambda _future: self._done.trigger())
         return future
 
     def _skip(self, found: PairedSample) -> None:
@@ -268,10 +259,68 @@ class EstimatorNode(ManagedNode):
         self.report([fit_status(stamp, update)])
 
 
-def main() -> int:
-    """Run the node."""
-    return run("estimator", "Identifies friction and process from op and pv.", EstimatorNode)
+def fit_status(stamp: int, update: FitUpdate) -> tuple[str, str, Keys]:
+    """Return task, message and key-values of one fit, which is told once."""
+    keys: Keys = [("window_end", stamp)]
+    for name, friction in update.trusted.items():
+        keys.append((f"{name}.trusted_law", friction.law))
+        keys += [(f"{name}.trusted_{key}", value) for key, value in friction.figures().items()]
+    keys.append(("identification", json_text(update.identification.to_dict(), indent=None)))
+    return "fit", verdicts_of(update), keys
 
 
-if __name__ == "__main__":
-    raise SystemExit(main())
+def verdicts_of(update: FitUpdate) -> str:
+    """Return the verdicts of one fit in one line."""
+    return ", ".join(f"{v.name} {v.verdict}" for v in update.identification.valves)
+
+
+def figures_of(update: FitUpdate) -> str:
+    """Return verdicts and frictions of one fit in one line, % of travel."""
+    frictions = [
+        f"{v.name}.f_s {v.static_friction:.3g}, {v.name}.f_d {v.dynamic_friction:.3g}"
+        for v in update.identification.valves
+    ]
+    return f"{verdicts_of(update)}; {', '.join(frictions)}"
+
+
+def monitor_status(
+    monitoring: Monitoring, stamp_of: Callable[[int], int]
+) -> tuple[str, str, str, Keys]:
+    """Return level, task, message and key-values of the monitor's own status.
+
+    Args:
+        monitoring: of the node.
+        stamp_of: gives the stamp of a sample, ns.
+    """
+    look, finding = monitoring.look, monitoring.finding
+    keys: Keys = [
+        ("looks", monitoring.looks),
+        ("grown_looks", monitoring.grown),
+        ("runs", monitoring.runs),
+        ("running", monitoring.running),
+    ]
+    if look is not None:
+        keys.append(("window_end", stamp_of(look.end)))
+        for output in look.outputs:
+            keys += [(f"{output.name}.{key}", getattr(output, key)) for key in FIGURES]
+    if finding is not None:
+        keys += [
+            ("verdict", finding.word),
+            ("effects", "; ".join(finding.effects)),
+            ("experiment", finding.document.get("experiment", "")),
+            ("verdict_window_end", stamp_of(finding.end)),
+        ]
+    troubled = look is not None and (look.grown or bool(look.failure))
+    return "warn" if troubled else "ok", "monitor", monitoring.text, keys
+
+
+def look_status(look: GapLook, stamp_of: Callable[[int], int]) -> tuple[str, str, Keys]:
+    """Return task, message and key-values of one measurement, which is told once."""
+    keys: Keys = [("window_end", stamp_of(look.end))]
+    return "gap", look.text, [*keys, ("look", json_text(look.to_dict(), indent=None))]
+
+
+def finding_status(found: GapFinding, stamp_of: Callable[[int], int]) -> tuple[str, str, Keys]:
+    """Return task, message and key-values of what was found, which is told once."""
+    keys: Keys = [("window_begin", stamp_of(found.begin)), ("window_end", stamp_of(found.end))]
+    return "finding", found.text, [*keys, ("finding", json_text(found.to_dict(), indent=None))]

@@ -8,13 +8,13 @@ import numpy as np
 import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.nodes.shared.managed import READER_QOS
 from stiction_ros.nodes.shared.messages import to_ns
 from stiction_ros.nodes.shared.peers import Inlet
-from stiction_ros.nodes.shared.typed import leave
 from stiction_ros.online.pairing import PairedSample, Pairing
 from stiction_ros.records import Record
 from stiction_ros.records.record import Quality
@@ -121,7 +121,8 @@ class Listener:
 
     def close(self) -> None:
         """Leave the graph."""
-        leave(self.node)
+        self.node.destroy_node()
+        try_shutdown()
 
     def _find_loops(self) -> None:
         kinds = dict(self.node.get_topic_names_and_types())

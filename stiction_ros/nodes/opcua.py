@@ -7,17 +7,13 @@ from typing import Any
 
 from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.nodes.opcua_topics import LoopTopics, grant_keys
-from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.shared.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import to_ns, values_of
-from stiction_ros.nodes.shared.peers import publishers_of
-from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.shared.typed import trigger
 from stiction_ros.online.plain_settings import OpcuaNodeSettings
 from stiction_ros.opcua import require_asyncua
 from stiction_ros.opcua.loop_bridge import IDENTITIES, BridgeRules, LoopBridge, WriteOrder
@@ -28,7 +24,6 @@ from stiction_ros.opcua.tag_map import LoopTags, TagMap, check_address
 QUICKEST, SLOWEST = 0.005, 0.05  # s between two looks for samples that are due
 PART = 10  # looks in a sample
 TOLD = 20  # loops that have a status of their own each; of more, those that are not well
-GRAPH_LOOKS = 10  # looks at the loop until the next one at who commands
 
 
 class OpcuaNode(ManagedNode):
@@ -46,10 +41,8 @@ class OpcuaNode(ManagedNode):
     def configure(self) -> None:
         settings = self.settings
         require_asyncua()
-        if not settings.tags:
-            raise InputError("no tag map", where="opcua: tags", fix="set it to a *.tags.yaml")
+        told = TagMap.load(find_config(self.needed("tags", "tag map", "*.tags.yaml")))
         self._writes = settings.write
-        told = TagMap.load(find_config(settings.tags))
         self._loops = self._chosen(told)
         self._url = settings.url or told.server
         check_address(self._url, "opcua: url")
@@ -58,7 +51,6 @@ class OpcuaNode(ManagedNode):
         self._said = "not connected yet"
         self._losses = 0
         self._refused: set[str] = set()
-        self._graph_looks = 0
         identity = random.SystemRandom().randrange(1, IDENTITIES)
         self.bridges: dict[str, LoopBridge] = {}
         self._topics: dict[str, LoopTopics] = {}
@@ -96,19 +88,11 @@ class OpcuaNode(ManagedNode):
             settings.speed,
             writes,
             writes and settings.ask == "start",
-            self._commander(tags),
+            self.commander(tags.namespace),
             identity,
         )
-        self.bridges[name] = LoopBridge(tags, rules, time.monotonic())
-        readers = ("controller", "estimator")
-        self._topics[name] = LoopTopics(
-            tags,
-            pv=self.outlet(JointState, f"{prefix}pv", SIGNAL_QOS, readers),
-            applied=self.outlet(JointState, f"{prefix}op_applied", SIGNAL_QOS),
-            sp=self._outlet_if(any(one.sp for one in tags.outputs), f"{prefix}sp"),
-            dv=self._outlet_if(bool(tags.disturbances), f"{prefix}dv"),
-            grant=self.outlet(String, f"{prefix}grant", LATCHED_QOS) if writes else None,
-        )
+        bridge = self.bridges[name] = LoopBridge(tags, rules, time.monotonic())
+        self._topics[name] = LoopTopics(self, bridge)
         for tag in tags.read_tags():
             self._by_tag.setdefault(tag, []).append(name)
         if writes:
@@ -120,17 +104,6 @@ class OpcuaNode(ManagedNode):
                 self.create_service(Trigger, f"{prefix}ask_grant", ask),
                 self.create_service(Trigger, f"{prefix}give_back_grant", back),
             ]
-
-    def _outlet_if(self, there: bool, topic: str) -> Any:
-        return self.outlet(JointState, topic, SIGNAL_QOS, ("controller",)) if there else None
-
-    def _commander(self, tags: LoopTags) -> str:
-        """Return the full name of the node whose OP is written."""
-        name = str(self.settings.commander)
-        if name.startswith("/"):
-            return name
-        parts = (self.get_namespace().strip("/"), tags.namespace, name)
-        return "/" + "/".join(part for part in parts if part)
 
     def configuration(self) -> dict[str, Any]:
         return {"url": self._url, "bridged": [tags.loop for tags in self._loops]}
@@ -186,20 +159,10 @@ class OpcuaNode(ManagedNode):
         now = time.monotonic()
         found = []
         for name, topics in self._topics.items():
-            level, text, values = topics.health(self.bridges[name], now)
+            level, text, values = topics.health(now)
             if level != "ok" or len(self.bridges) <= TOLD:
                 found.append((level, f"loop {name}", text, values))
         return found
-
-    def look(self) -> None:
-        self._graph_looks += 1
-        if self._graph_looks % GRAPH_LOOKS:
-            return
-        for name in self._writes:
-            topic = self._topics[name].pv.publisher.topic_name.removesuffix("pv") + "op"
-            names = publishers_of(self, topic)
-            if len(names) > 1:
-                self.notice("commanders", "error", f"op is published by {', '.join(names)}")
 
     # ---- the plant -------------------------------------------------------------------------
 
@@ -207,7 +170,7 @@ class OpcuaNode(ManagedNode):
         """Called by the link's thread."""
         if not self._woken:
             self._woken = True
-            trigger(self._wakeup)
+            self._wakeup.trigger()
 
     def _serve(self) -> None:
         """Take in what the plant said, publish what is due, write what is to be written."""
@@ -271,7 +234,7 @@ class OpcuaNode(ManagedNode):
     def _tell_grants(self) -> None:
         """Publish every grant that has changed."""
         for name in self._writes:
-            grant = self._topics[name].changed_grant(self.bridges[name])
+            grant = self._topics[name].changed_grant()
             if grant is not None:
                 self.log.info(f"loop {name}: {grant.state.value}, {grant.reason}")
                 self.report([(f"grant {name}", grant.state.value, grant_keys(grant))])
@@ -309,12 +272,3 @@ class OpcuaNode(ManagedNode):
         self._tell_grants()
         response.success, response.message = True, "given back"
         return response
-
-
-def main() -> int:
-    """Run the node."""
-    return run("opcua", "Bridges loops of a control system by OPC UA.", OpcuaNode)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -4,15 +4,16 @@ from array import array
 from collections.abc import Sequence
 
 import numpy as np
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import joint_state
 from stiction_ros.nodes.shared.peers import Outlet
 from stiction_ros.online.input.op_port import Reception
 from stiction_ros.opcua.grant import Grant
 from stiction_ros.opcua.loop_bridge import LoopBridge
 from stiction_ros.opcua.sampling import PlantSample, TagQuality
-from stiction_ros.opcua.tag_map import LoopTags
 
 COUNTED = ("past", "ahead", "late", "bad", "skipped", "new_runs")
 SHOWN = 3  # refused tags that a status names
@@ -21,24 +22,27 @@ SHOWN = 3  # refused tags that a status names
 class LoopTopics:
     """Publishes samples of one loop and tells how it fares."""
 
-    def __init__(
-        self,
-        tags: LoopTags,
-        *,
-        pv: Outlet,
-        applied: Outlet,
-        sp: Outlet | None,
-        dv: Outlet | None,
-        grant: Outlet | None,
-    ) -> None:
-        """Take the outlets; None for what the loop does not have."""
-        self.tags, self.pv = tags, pv
-        self._applied, self._sp, self._dv, self._grant = applied, sp, dv, grant
+    def __init__(self, node: ManagedNode, bridge: LoopBridge) -> None:
+        """Create the topics of what the loop has, in the namespace of its tags."""
+        self._bridge, self._tags = bridge, bridge.tags
+        space = f"{self._tags.namespace}/" if self._tags.namespace else ""
+        self._outputs = [output.name for output in self._tags.outputs]
+        self._valves = [valve.name for valve in self._tags.valves]
+        self._measured = [one.name for one in self._tags.disturbances]
+
+        def outlet(name: str, *readers: str) -> Outlet:
+            return node.outlet(JointState, f"{space}{name}", SIGNAL_QOS, readers)
+
+        self._pv = outlet("pv", "controller", "estimator")
+        self._applied = outlet("op_applied")
+        has_sp = any(one.sp for one in self._tags.outputs)
+        self._sp = outlet("sp", "controller") if has_sp else None
+        self._dv = outlet("dv", "controller") if self._measured else None
+        self._grant: Outlet | None = None
+        if bridge.rules.writes:
+            self._grant = node.outlet(String, f"{space}grant", LATCHED_QOS)
         self._told: Grant | None = None
         self._last: PlantSample | None = None
-        self._outputs = [output.name for output in tags.outputs]
-        self._valves = [valve.name for valve in tags.valves]
-        self._measured = [one.name for one in tags.disturbances]
 
     def publish(self, sample: PlantSample, by: str) -> None:
         """Publish a sample; pv, which the partners act on, comes last.
@@ -48,7 +52,7 @@ class LoopTopics:
         """
         self._last, stamp = sample, sample.stamp
         if np.isfinite(sample.op_before).all():
-            before = stamp - self.tags.sample_ns
+            before = stamp - self._tags.sample_ns
             applied = joint_state(before, self._valves, sample.op_before)
             applied.header.frame_id = by
             self._applied.publish(applied)
@@ -59,11 +63,11 @@ class LoopTopics:
         message = joint_state(stamp, self._outputs, sample.pv)
         message.velocity = array("d", sample.pv_age)
         message.effort = array("d", [float(one) for one in sample.pv_quality])
-        self.pv.publish(message)
+        self._pv.publish(message)
 
-    def changed_grant(self, bridge: LoopBridge) -> Grant | None:
+    def changed_grant(self) -> Grant | None:
         """Publish the grant when its state or reason is new, and return it then."""
-        grant, before = bridge.grant, self._told
+        grant, before = self._bridge.grant, self._told
         if before is not None and (grant.state, grant.reason) == (before.state, before.reason):
             return None
         self._told = grant
@@ -71,15 +75,16 @@ class LoopTopics:
             self._grant.publish(String(data=grant.state.value))
         return grant
 
-    def health(self, bridge: LoopBridge, now: float) -> tuple[str, str, list[tuple[str, object]]]:
+    def health(self, now: float) -> tuple[str, str, list[tuple[str, object]]]:
         """Return level, message and values of the loop's status."""
+        bridge = self._bridge
         sampler, grant = bridge.sampler, bridge.grant
         present = sampler.now(now)
         values = grant_keys(grant)
         if present is not None:
             values.append(("plant_time", f"{present / 1e9:.3f}"))
         modes = [
-            (f"mode:{v.name}", sampler.latest(v.mode).value) for v in self.tags.valves if v.mode
+            (f"mode:{v.name}", sampler.latest(v.mode).value) for v in self._tags.valves if v.mode
         ]
         values += [*modes, *((key, sampler.counts[key]) for key in COUNTED)]
         values += sorted(bridge.counts.items())

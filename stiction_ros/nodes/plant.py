@@ -12,16 +12,13 @@ from sensor_msgs.msg import JointState
 
 from stiction_ros.config_files import find_config
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints, read_valve_changes
 from stiction_ros.loop.member_loops import MemberLoop, Wiring, read_member_loops, whole_plant
 from stiction_ros.nodes.shared.managed import LOOKS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_ns, to_stamp, values_of
 from stiction_ros.nodes.shared.peers import Outlet, publishers_of
-from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.shared.typed import restart
 from stiction_ros.online.health import stopped_after
-from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
+from stiction_ros.online.input.op_port import OpPort, Reception
 from stiction_ros.online.plain_settings import PlantNodeSettings
 from stiction_ros.online.round_trips import RoundTrips, TickGrid
 
@@ -61,9 +58,8 @@ class PlantNode(ManagedNode):
 
     def configure(self) -> None:
         settings = self.settings
-        if not settings.model:
-            raise InputError("no loop model", where="plant: model", fix="set it to a *.loop.yaml")
-        self.model = LoopModel.load(find_config(settings.model))
+        model = self.needed("model", "loop model", "*.loop.yaml")
+        self.model = LoopModel.load(find_config(model))
         self.schedule = None
         if settings.set_points:
             path = find_config(settings.set_points)
@@ -73,7 +69,7 @@ class PlantNode(ManagedNode):
         )
         self.plant = Plant(self.model, settings.seed, changes)
         self._step = round(self.model.sample_time * SECOND)
-        self._start = round(settings.start_time * SECOND)
+        self._start = SECOND  # simulated time of the first sample
         self.stamp = self._start
         self._realtime = settings.pace == "realtime"
         loops = read_member_loops(settings.loops, self.model, "plant: loops")
@@ -89,11 +85,11 @@ class PlantNode(ManagedNode):
         """Create the topics of one loop, in the namespace of its name."""
         space = f"{loop.name}/" if loop.name else ""  # of one loop alone: that of the plant
         controller, estimator = f"{space}controller", f"{space}estimator"
-        rules = CommandRules(self._commander(space), self._step, exact=not self._realtime)
+        commander = self.commander(loop.name) if self.settings.commander else ""
         op = self.wiring.op_of(loop)
         joined = JoinedLoop(
             loop,
-            op_port=OpPort(rules),
+            op_port=OpPort(commander, self._step, exact=not self._realtime),
             op=op,
             # What was in force before the run: a reader knows the OP of its first sample.
             applied=joint_state(self._start - self._step, loop.valves, op),
@@ -109,13 +105,6 @@ class PlantNode(ManagedNode):
         take = functools.partial(self._on_op, joined)
         self.inlet(JointState, f"{space}op", take, READER_QOS, (controller,))
         return joined
-
-    def _commander(self, space: str) -> str:
-        """Return the full name of the node that commands; empty for the first that does."""
-        name = str(self.settings.commander)
-        if not name or name.startswith("/"):
-            return name
-        return f"{self.get_namespace().rstrip('/')}/{space}{name}"
 
     def configuration(self) -> dict[str, Any]:
         told = {"seed": self.settings.seed, "model": self.model.to_mapping()}
@@ -234,7 +223,7 @@ class PlantNode(ManagedNode):
         before = self._grid.missed
         if self._grid.tick(time.monotonic()):
             if self._pacer is not None:
-                restart(self._pacer)
+                self._pacer.reset()
             if self._grid.missed > before:
                 self._missed += self._grid.missed - before
                 self.notice("pace", "warn", "the plant is slower than its speed asks for")
@@ -281,12 +270,3 @@ class PlantNode(ManagedNode):
         for joined in self._loops:
             shown = self.wiring.of(joined.loop, measured.pv)
             joined.pv.publish(joint_state(self.stamp, joined.loop.outputs, shown))
-
-
-def main() -> int:
-    """Run the node."""
-    return run("plant", "Simulates a loop model with sticky valves.", PlantNode)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -1,9 +1,8 @@
 """The player: a bag back into the graph, at any rate, with pause and steps."""
 
+import time
 from typing import Any
 
-from rclpy.clock import Clock as RosClock
-from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -15,8 +14,6 @@ from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, message_class, to_stamp
 from stiction_ros.nodes.shared.peers import Outlet
-from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.shared.typed import quality
 from stiction_ros.online.plain_settings import PlayerNodeSettings
 from stiction_ros.records.bag.playback import Playback, bag_content, offered_qos
 from stiction_ros.records.storage.bag_metadata import BagTopic, Qos
@@ -35,17 +32,14 @@ class PlayerNode(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("player", PlayerNodeSettings, **kwargs)
-        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
         self._pacer: Timer | None = None
         self._offered: list[Any] = []
 
     def configure(self) -> None:
         settings = self.settings
-        if not settings.bag:
-            raise InputError("no bag", where="player: bag", fix="set it to a bag")
-        content = bag_content(settings.bag, settings.topics)
+        content = bag_content(self.needed("bag", "bag", "bag"), settings.topics)
         how = settings.rate, settings.start, settings.loop
-        self.playback = Playback(content, self._now, *how)
+        self.playback = Playback(content, time.monotonic_ns, *how)
         self._skipped: dict[str, str] = {}
         self._topics: dict[str, Outlet] = {}
         recorded = settings.clock == "auto" and CLOCK in content.topics
@@ -67,7 +61,7 @@ class PlayerNode(ManagedNode):
                 ("step", self._on_step),
             )
         ]
-        self._pacer = self.create_timer(PERIOD, self._tick, clock=self._steady)
+        self._pacer = self.create_timer(PERIOD, self._tick)
 
     def linked(self) -> None:
         if self._resumes:
@@ -117,9 +111,6 @@ class PlayerNode(ManagedNode):
         known = self.outlets.get(topic.name)
         self._topics[topic.name] = known or self.outlet(kind, topic.name, qos)
 
-    def _now(self) -> int:
-        return int(self._steady.now().nanoseconds)
-
     def _tick(self) -> None:
         if not self.running:
             return
@@ -135,8 +126,9 @@ class PlayerNode(ManagedNode):
     def _send(self, messages: list[RawMessage]) -> None:
         """Publish; the player's own clock goes before the messages of its time."""
         self.stamp = self.playback.time
-        if self._own and (messages or self._now() - self._told > SECOND / self.settings.clock_rate):
-            self._told = self._now()
+        now = time.monotonic_ns()
+        if self._own and (messages or now - self._told > SECOND / self.settings.clock_rate):
+            self._told = now
             self._clock_out.publish(Clock(clock=to_stamp(self.stamp)))
         for message in messages:
             outlet = self._topics.get(message.topic.name)
@@ -166,25 +158,16 @@ class PlayerNode(ManagedNode):
     def _answer(self, response: Trigger.Response) -> Trigger.Response:
         """Fill the answer in: the time that is being played."""
         response.success = bool(self.running)
-        time = f"at {self.playback.time / SECOND:.9f} s"
-        response.message = time if self.running else "not active"
+        at = f"at {self.playback.time / SECOND:.9f} s"
+        response.message = at if self.running else "not active"
         self.report()
         return response
 
 
 def _profile(qos: Qos) -> QoSProfile:
-    return quality(
-        qos.depth,
-        ReliabilityPolicy[qos.reliability.upper()],
-        DurabilityPolicy[qos.durability.upper()],
-        HistoryPolicy[qos.history.upper()],
+    return QoSProfile(
+        depth=qos.depth,
+        reliability=ReliabilityPolicy[qos.reliability.upper()],
+        durability=DurabilityPolicy[qos.durability.upper()],
+        history=HistoryPolicy[qos.history.upper()],
     )
-
-
-def main() -> int:
-    """Run the node."""
-    return run("player", "Plays a bag back into the graph.", PlayerNode)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -3,13 +3,10 @@
 import itertools
 import re
 import struct
-import time
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.qos import QoSCompatibility, qos_check_compatible
@@ -19,9 +16,6 @@ from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, message_class, offered_qos, reader_qos
 from stiction_ros.nodes.shared.peers import Inlet
-from stiction_ros.nodes.shared.runner import run
-from stiction_ros.nodes.shared.typed import RawTake, subscribe_raw
-from stiction_ros.online.health import Noticed
 from stiction_ros.online.plain_settings import RecorderNodeSettings
 from stiction_ros.records.bag.finish import CLOCK
 from stiction_ros.records.bag.message_definitions import definition
@@ -74,7 +68,6 @@ class RecorderNode(ManagedNode):
         super().__init__("recorder", RecorderNodeSettings, **kwargs)
         self.writer: BagWriter | None = None
         self._bags: list[Path] = []
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
 
     def configure(self) -> None:
         settings = self.settings
@@ -90,15 +83,14 @@ class RecorderNode(ManagedNode):
         self._topics: dict[str, Inlet] = {}
         self._skipped: dict[str, str] = {}
         self._unheard: dict[str, str] = {}
-        self._noticed = Noticed(time.monotonic)
         self._lost = self._put_back = 0
         self._times = LogTime()
         own = settings.regex == OWN and space != "/"
         self._own_pv = self.resolve_topic_name("pv") if own else ""
         self._clock_runs = False
         self._looking = [
-            self.create_timer(DISCOVERY_PERIOD, self._discover, clock=self._steady),
-            self.create_timer(BAG_PERIOD, self._look_at_the_bag, clock=self._steady),
+            self.create_timer(DISCOVERY_PERIOD, self._discover),
+            self.create_timer(BAG_PERIOD, self._look_at_the_bag),
         ]
         self._discover()  # now, or its own first status would find no reader
 
@@ -110,8 +102,6 @@ class RecorderNode(ManagedNode):
         keys += [(f"skipped:{name}", why) for name, why in self._skipped.items()]
         keys += [(f"unheard:{name}", why) for name, why in self._unheard.items()]
         keys += [("lost", self._lost), ("put_back", self._put_back)]
-        if self._noticed.level == "error":
-            return "error", self._noticed.text, keys
         return ("warn" if self._skipped or self._unheard else "ok"), "recording", keys
 
     def finish(self) -> None:
@@ -167,12 +157,12 @@ class RecorderNode(ManagedNode):
         text, type_hash = definition(kind)
         self.writer.add_topic(name, kind, text, type_hash, [offered_qos(i) for i in offered])
         qos = reader_qos(offered, READER_QOS.depth)
-        subscription = subscribe_raw(
-            self,
+        subscription = self.create_subscription(
             message_class(kind),
             name,
             self._writing(name, kind),
             qos,
+            raw=True,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         self._topics[name] = Inlet(subscription, (), qos, informed=True)
@@ -201,15 +191,14 @@ class RecorderNode(ManagedNode):
             )
         else:
             self._put_back += bool(said)
-        if said and self._noticed.notice("removed", "error", said):
-            self.log.error(said)
+        if said:
+            self.notice("removed", "error", said)
 
     def _refused(self, error: OSError) -> None:
         """Note that the storage refused something."""
         assert self.writer is not None
         said = f"{self.writer.directory}: {error.strerror}; {self._lost} messages lost so far"
-        if self._noticed.notice("storage", "error", said):
-            self.log.error(said)
+        self.notice("storage", "error", said)
 
     def _look_for_unheard(self) -> None:
         """Tell of publishers that came later and offer less than the subscription asks for."""
@@ -223,7 +212,7 @@ class RecorderNode(ManagedNode):
                     self.log.warning(f"{name} of {self._unheard[name]} is not recorded")
                     break
 
-    def _writing(self, topic: str, kind: str) -> RawTake:
+    def _writing(self, topic: str, kind: str) -> Callable[..., None]:
         """Return the callback of one topic; log time is simulated time where there is any."""
         tells_time = (topic, kind) in {(CLOCK, CLOCK_TYPE), (self._own_pv, JOINT_STATE)}
 
@@ -268,12 +257,3 @@ def free_directory(wanted: Path, written: Collection[Path]) -> Path:
         return wanted
     beside = (wanted.with_name(f"{wanted.name}_{number}") for number in itertools.count(2))
     return next(path for path in beside if not path.exists())
-
-
-def main() -> int:
-    """Run the node."""
-    return run("recorder", "Records every topic into one MCAP bag.", RecorderNode)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -74,9 +74,6 @@ class PlantNodeSettings(NodeSettings):
         high=1e5,
         beside=("pace", "lockstep"),
     )
-    start_time: float = setting(
-        1.0, "simulated time of the first sample, s", low=0.0, high=4e9, fixed=True
-    )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,22 +1,20 @@
 """How long the loop takes to answer: wall time from a PV to the OP of its sample."""
 
-import math
+from collections import deque
 
 import numpy as np
 
-SHORTEST = 1e-6  # s, the lower end of what is told apart
-GROWTH = 1.01  # from one bin to the next: figures are right to 1 %
-BINS = 2400  # up to 6 hours
 OPEN = 1000  # samples whose OP is awaited; older ones count as unanswered
+KEPT = 20_000  # the latest answered samples, of which the figures tell
 FIGURES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
 LATE = 0.5  # of a period: a tick that is later would come too close to the next
 
 
 class RoundTrips:
-    """Counts the times of all samples, however many, in bins that grow by 1 %."""
+    """Times of the latest samples, and how many of all were asked and answered."""
 
     def __init__(self) -> None:
-        self._bins = np.zeros(BINS, dtype=np.int64)
+        self._seconds: deque[float] = deque(maxlen=KEPT)
         self._open: dict[int, float] = {}
         self.asked = self.answered = 0
         self.longest = 0.0
@@ -35,22 +33,16 @@ class RoundTrips:
         begin = self._open.pop(stamp, None)
         if begin is None:
             return
-        seconds = max(now - begin, SHORTEST)
         self.answered += 1
-        self.longest = max(self.longest, seconds)
-        place = math.ceil(math.log(seconds / SHORTEST) / math.log(GROWTH))
-        self._bins[min(max(place, 0), BINS - 1)] += 1
+        self.longest = max(self.longest, now - begin)
+        self._seconds.append(now - begin)
 
     def milliseconds(self) -> dict[str, float]:
-        """Return p50, p99, p999 (each at most 1 % too large) and max, ms; empty without any."""
+        """Return p50, p99, p999 and the maximum of all, ms; empty without any."""
         if not self.answered:
             return {}
-        ranks = np.cumsum(self._bins)
-        found = {}
-        for name, share in FIGURES.items():
-            place = int(np.searchsorted(ranks, max(math.ceil(share * self.answered), 1)))
-            found[name] = 1e3 * min(SHORTEST * GROWTH**place, self.longest)
-        return found | {"max": 1e3 * self.longest}
+        shares = 1e3 * np.quantile(self._seconds, [*FIGURES.values()], method="inverted_cdf")
+        return {**dict(zip(FIGURES, shares.tolist(), strict=True)), "max": 1e3 * self.longest}
 
 
 class TickGrid:

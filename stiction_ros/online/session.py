@@ -29,10 +29,10 @@ from stiction_ros.loop.yaml_reading import Section, load_yaml
 from stiction_ros.online.controller.live import ModeChange
 from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.controller.testing import ValveTestingController
-from stiction_ros.online.estimator.live import EstimatorSettings, FitUpdate, LiveEstimator, fit
+from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.input.signal_check import SignalCheck
 from stiction_ros.online.monitor.gap_finding import GapFinding
-from stiction_ros.online.monitor.gap_monitor import GapLook, MonitorRule
+from stiction_ros.online.monitor.gap_monitor import GapLook
 from stiction_ros.online.monitor.monitoring import Monitoring, check_model
 from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
 from stiction_ros.online.plain_settings import (
@@ -156,7 +156,6 @@ class Scenario(SimulatedPlant):
         seed, samples: of the plant.
         valve_changes: valves of the plant that change in mid-run.
         controller, estimator: settings of the two.
-        monitor: rule of the estimator's monitor.
         monitor_model: what the monitor compares with; None for the loop as it is identified.
 
     Examples:
@@ -171,8 +170,7 @@ class Scenario(SimulatedPlant):
     nodes: Mapping[str, Mapping[str, Any]]
     process: LoopModel
     controller: LiveControllerSettings
-    estimator: EstimatorSettings
-    monitor: MonitorRule = MonitorRule()
+    estimator: EstimatorNodeSettings
     monitor_model: LoopModel | None = None
 
     def __repr__(self) -> str:
@@ -249,7 +247,6 @@ class Scenario(SimulatedPlant):
             process=process,
             controller=controller,
             estimator=checked["estimator"],
-            monitor=checked["estimator"],
             monitor_model=watched,
         )
 
@@ -302,8 +299,8 @@ class LoopSession:
                 scenario.estimator, plant.name, plant.valve_names, plant.outputs, plant.sample_time
             )
         self.monitoring: Monitoring | None = None
-        if self.estimator is not None and scenario.monitor.monitor:
-            self.monitoring = Monitoring(scenario.monitor, self.estimator, scenario.monitor_model)
+        if self.estimator is not None and scenario.estimator.monitor:
+            self.monitoring = Monitoring(scenario.estimator, self.estimator, scenario.monitor_model)
         self.looks: list[GapLook] = []
         self.findings: list[GapFinding] = []
         self.fits: list[FitUpdate] = []

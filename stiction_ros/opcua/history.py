@@ -16,7 +16,7 @@ from stiction_ros.intake.modes import AUTOMATIC
 from stiction_ros.opcua.loop_bridge import mode_text
 from stiction_ros.opcua.sampling import JITTER, TagQuality, TagReading
 from stiction_ros.opcua.security import Credentials
-from stiction_ros.opcua.session import ANSWER, EPOCH, node_ids, open_client, reading_of
+from stiction_ros.opcua.session import ANSWER, EPOCH, describe, node_ids, open_client, reading_of
 from stiction_ros.opcua.tag_map import LoopTags
 from stiction_ros.records import Record
 from stiction_ros.records.record import Quality
@@ -145,8 +145,6 @@ async def fetch(
     """
     from asyncua import ua
 
-    from stiction_ros.opcua.session import describe
-
     try:
         client = await open_client(url, credentials)
     except (OSError, TimeoutError, ua.UaError) as error:
@@ -201,18 +199,8 @@ async def _fetch_tag(client: "Client", node: "ua.NodeId", file: HistoryFile, spa
 
 async def _in_force(where: Any, begin: int) -> list[TagReading]:
     """Return the last value before ``begin``, read backwards: it holds until the next one."""
-    from asyncua import ua
-
-    details = ua.ReadRawModifiedDetails(
-        IsReadModified=False,
-        StartTime=_moment(begin - 1000),
-        EndTime=EPOCH,
-        NumValuesPerNode=1,
-        ReturnBounds=False,
-    )
-    result = await where.history_read(details)
-    result.StatusCode.check()
-    found = [reading_of(value, first=False) for value in result.HistoryData.DataValues]
+    values = await where.read_raw_history(_moment(begin - 1000), EPOCH, 1, return_bounds=False)
+    found = [reading_of(value, first=False) for value in values]
     return [one for one in found if 0 < one.stamp < begin][:1]
 
 

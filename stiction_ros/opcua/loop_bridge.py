@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.online.health import stopped_after
-from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
+from stiction_ros.online.input.op_port import OpPort, Reception
 from stiction_ros.opcua.grant import Facts, GrantState, begin
 from stiction_ros.opcua.op_limits import OpLimits, RateWatch
 from stiction_ros.opcua.sampling import LoopSampler, PlantSample, TagQuality, TagReading
@@ -24,26 +24,17 @@ IDENTITIES = 1 << 15  # numbers of writers
 COUNT = 1 << 16  # beats until the count begins anew
 
 
+def beat_of(identity: int, count: int) -> int:
+    """Return a beat that bears its writer, so that another one is seen.
+
+    It is ``identity`` · 65 536 + count, a whole number of 31 bits.
+    """
+    return identity * COUNT + count % COUNT
+
+
 def identity_of(beat: float) -> int:
     """Return the number of the writer of a beat; 0 is nobody."""
     return int(beat) // COUNT if 0 <= beat < IDENTITIES * COUNT else -1
-
-
-class OwnBeat:
-    """A number that rises with each beat and bears ours, so that another writer is seen.
-
-    A beat is ``identity`` · 65 536 + count, a whole number of 31 bits.
-    """
-
-    def __init__(self, identity: int) -> None:
-        """Start; ``identity`` in 1 … 32 767, drawn at random by the caller."""
-        self.identity = identity
-        self._count = 0
-
-    def next(self) -> int:
-        """Return the next beat."""
-        self._count = (self._count + 1) % COUNT
-        return self.identity * COUNT + self._count
 
 
 class HeardBeat:
@@ -107,13 +98,13 @@ class LoopBridge:
         self.grant = begin(now, rules.writes and tags.grant is not None)
         if rules.asks:
             self.grant = self.grant.ask()
-        self.op_port = OpPort(CommandRules(rules.commander, tags.sample_ns, exact=False))
+        self.op_port = OpPort(rules.commander, tags.sample_ns, exact=False)
         self.counts: Counter[str] = Counter()
         self.refused: tuple[str, ...] = ()
         valves = tags.valves
         names, rates = [v.name for v in valves], [v.rate for v in valves]
         self.rate_watch = RateWatch(names, rates, tags.sample_time)
-        self._beat, self._foreign, self._plant = OwnBeat(rules.identity), HeardBeat(), HeardBeat()
+        self._foreign, self._plant, self._beaten = HeardBeat(), HeardBeat(), 0
         self._alive = False
         self._alive_since = self._command_at = self._beat_at = now
         self._told = 0.0  # what the request says, as far as we wrote it
@@ -295,8 +286,8 @@ class LoopBridge:
         assert told is not None
         if not self.grant.requesting or now - self._beat_at < told.watchdog / BEATS:
             return []
-        self._beat_at = now
-        values = ((told.heartbeat, float(self._beat.next())),)
+        self._beat_at, self._beaten = now, self._beaten + 1
+        values = ((told.heartbeat, float(beat_of(self.rules.identity, self._beaten))),)
         return [WriteOrder(self.tags.loop, Use.BEAT, values, now + told.watchdog / BEATS)]
 
     # ---- the OP ----------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from stiction_ros.errors import InputError
-from stiction_ros.opcua.session import is_open, kind_of, node_id
+from stiction_ros.opcua.session import is_open, node_id
 from stiction_ros.opcua.tag_map import Use
 
 if TYPE_CHECKING:
@@ -70,7 +70,8 @@ class ServerTags:
         from asyncua import ua
 
         try:
-            kind = await kind_of(self._client, self.nodes[tag])
+            node = self._client.get_node(self.nodes[tag])
+            kind = await node.read_data_type_as_variant_type()
         except ua.UaError as error:
             if not is_open(self._client):
                 raise

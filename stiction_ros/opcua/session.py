@@ -178,11 +178,6 @@ def describe(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-async def kind_of(client: "Client", node: "ua.NodeId") -> "ua.VariantType":
-    """Return the type of value that a node takes."""
-    return await client.get_node(node).read_data_type_as_variant_type()
-
-
 async def write(
     client: "Client",
     order: WriteOrder,

@@ -153,7 +153,7 @@ def _look(found: Discrepancy, look: Look, k: int) -> list[str]:
         rows.append(
             [
                 say.candidate_of(fit) + outside,
-                say.named_figures(found, fit),
+                say.named_figures(fit),
                 number(fit.delta_bic),
                 number(round(fit.held_gain, 3) + 0.0),
             ]

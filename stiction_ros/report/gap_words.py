@@ -3,7 +3,7 @@
 import math
 import re
 
-from stiction_ros.discrepancy import Discrepancy, FoundEffect
+from stiction_ros.discrepancy import FoundEffect
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.effects import behaviours
@@ -104,20 +104,18 @@ def _digits(value: float, ends: tuple[float, float]) -> int:
 
 def candidate_of(fit: CandidateFit) -> str:
     """Return a candidate for a table, its law where an effect has several."""
-    kind = getattr(fit.candidate, "kind", None)
-    law = getattr(kind, "law", None)
+    law = fit.candidate.law
     return called(*fit.candidate.key) + (f", law {law}" if law is not None else "")
 
 
-def named_figures(found: Discrepancy, fit: CandidateFit) -> str:
+def named_figures(fit: CandidateFit) -> str:
     """Return a candidate's figures by their names; nothing outside the catalogue."""
-    behaviour = fit.behaviour(found.base_before.run)
-    if behaviour is None:
+    if fit.behaviour is None:
         return ""
     parts = []
-    for entry in behaviour.parameters():
+    for entry in fit.behaviour.parameters():
         unit = "" if entry.unit == "1" or "signal" in entry.unit else f" {entry.unit}"
         parts.append(
-            f"{symbol(entry.key)} {number(float(getattr(behaviour, entry.attribute)))}{unit}"
+            f"{symbol(entry.key)} {number(float(getattr(fit.behaviour, entry.attribute)))}{unit}"
         )
     return ", ".join(parts)

@@ -17,7 +17,7 @@ from stiction_ros.records.record import Record
 from stiction_ros.records.valve_work import ValveWork
 from stiction_ros.report.page import Cell, number, table, write_page
 from stiction_ros.report.run.identified import process_table, valve_cards, verdict_line
-from stiction_ros.report.shapes import free_run, responses
+from stiction_ros.report.shapes import responses
 from stiction_ros.texts import finite, probability
 
 
@@ -124,7 +124,7 @@ def _free_runs(record: Record, found: Identification) -> str:
     drawn = []
     for model in found.outputs:
         pv = record.pv[:, record.outputs.index(model.name)]
-        run = free_run(model, stems, pv)
+        run = model.free_run(stems, pv)
         curves = [Curve(f"{model.name}, measured", "pv", pv), Curve("model", "free", run)]
         said = (
             f"The model of {model.name} driven by the recorded OP alone: friction, then process. "

@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification import OutputModel
 from stiction_ros.loop import LoopModel
 from stiction_ros.pages.plot import KINDS, Curve, over_time
 from stiction_ros.pages.signals import Units
 from stiction_ros.records.record import Record
-from stiction_ros.signals.free_run import driven, fitted_free_run
 from stiction_ros.signals.free_run import step_response as answer_to_step
 from stiction_ros.signals.polynomials import largest_root
 
@@ -53,15 +51,6 @@ def step_response(output: Mapping[str, Any], valve: str, samples: int) -> FloatA
         return np.zeros(samples)
     delay = int(output["delay"].get(valve, 0))
     return answer_to_step(output["a"], output["b"][valve], delay, samples)
-
-
-def free_run(
-    output: OutputModel, stems: Mapping[str, FloatArray], measured: FloatArray
-) -> FloatArray:
-    """Return PV, (N,), of an output (9) driven by stems, (N,), %, alone, its start fitted."""
-    delays = [output.delay[valve] for valve in output.b]
-    drive = driven(output.b.values(), delays, [stems[valve] for valve in output.b], output.bias)
-    return fitted_free_run(output.a, drive, measured)
 
 
 def true_response(model: LoopModel, output: int, valve: int, samples: int) -> FloatArray:

@@ -23,12 +23,12 @@ def test_bounds_left_out_at_first_change_no_optimum(seed: int, room: float) -> N
     size = HORIZON * 2
     qp = HorizonQp(cost, np.eye(size), np.zeros((0, size)), bounds)
     lower, upper = np.full(size, -30.0), np.full(size, 30.0)
-    found = qp.solve(state, last, np.zeros(size), lower, upper, target.pv)
+    found = qp.solve(state, cost.linear(state, last), lower, upper, target.pv)
     assert found is not None
-    whole = qp.problem(state, last, lower, upper, target.pv)
+    whole, linear = qp.problem(state, last, lower, upper, target.pv)
     sense = np.zeros(len(whole.upper), dtype=np.int32)
     solution, value, flag, _ = daqp.solve(
-        whole.hessian, whole.linear, whole.matrix, whole.upper, whole.lower, sense
+        whole.hessian, linear, whole.matrix, whole.upper, whole.lower, sense
     )
     assert flag == 1
     assert found.cost == pytest.approx(value, rel=1e-6, abs=1e-6)
@@ -41,12 +41,13 @@ def test_a_broken_bound_is_priced_and_a_kept_one_is_not() -> None:
     cost = HorizonCost(model, weights_for(model, HORIZON))
     target = target_at(model, np.array([50.0, 50.0]))
     size = HORIZON * 2
-    zero, far = np.zeros(size), np.full(size, 30.0)
+    far = np.full(size, 30.0)
 
     def solved(high: float) -> tuple[float, float]:
         bounds = np.array([[-np.inf, target.pv[0] + high], [-np.inf, np.inf]])
         qp = HorizonQp(cost, np.eye(size), np.zeros((0, size)), bounds)
-        found = qp.solve(np.ones(3), np.zeros(2), zero, -far, far, target.pv)
+        gradient = cost.linear(np.ones(3), np.zeros(2))
+        found = qp.solve(np.ones(3), gradient, -far, far, target.pv)
         assert found is not None
         return found.cost, found.slack[0]
 

@@ -5,8 +5,12 @@ import pytest
 from gap_loops import loop, record
 
 from stiction_ros.discrepancy import Discrepancy, GapOptions, find_discrepancy
-from stiction_ros.discrepancy.candidate.wave import LoadCandidate, disturbance_candidates
-from stiction_ros.discrepancy.candidate.waves import A_FREQUENCY, StepWave
+from stiction_ros.discrepancy.candidate.wave import (
+    A_FREQUENCY,
+    LOAD,
+    StepCandidate,
+    disturbance_candidates,
+)
 from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import (
@@ -66,7 +70,7 @@ def test_a_sine_is_the_same_wherever_it_enters() -> None:
 
 def test_the_response_to_a_load_is_that_of_its_stem() -> None:
     run = FreeRun(loop(), open_gate(loop(), [record(loop(), samples=300)])[0])
-    candidate = LoadCandidate.beside(run, 0, StepWave.of(run, np.zeros(0)))
+    candidate = StepCandidate.of(run, LOAD, 0, np.zeros(0))
     response = candidate.respond(run, np.array([[120.0]]))
     moved = FreeRun(loop().with_effect("load:V1", StepDisturbance(120.0, 2.5)), run.runs)
     assert 2.5 * response.sizes[0][:, 0, 0] == pytest.approx(

@@ -40,7 +40,7 @@ def test_gain_and_dead_time_of_a_model_that_is_off_are_found() -> None:
     assert found["gain"].value == pytest.approx(1.0 / 1.08, rel=0.02)
     low, high = found["delay"].interval
     assert low <= -1.0 <= high
-    assert FreeRun(changed.model, runs).model.valve_names == ("V1",)
+    assert FreeRun(changed.bare, runs).model.valve_names == ("V1",)
 
 
 def test_a_model_that_is_right_is_not_changed() -> None:

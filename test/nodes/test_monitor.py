@@ -116,7 +116,7 @@ def test_it_is_silent_before_the_shift_and_warns_after_it(graph: Graph) -> None:
 @pytest.mark.trial
 def test_the_status_names_the_shift_with_figures_per_output(graph: Graph) -> None:
     status, values = statuses(graph, "monitor")[-1]
-    assert "PV1: sensor bias_step" in status.message
+    assert "bias step of the sensor of PV1" in status.message
     assert values["verdict"] == "ambiguous"
     assert float(values["PV1.growth"]) > float(values["PV1.limit"]) > 1.0
     assert float(values["PV1.gap"]) > float(values["PV1.baseline"]) > 0.0

@@ -86,8 +86,7 @@ OPENS = {  # what can listen, by its name in a call
     "SyncManager",
 }
 KNOWN = {
-    ("stiction_ros/nodes/controller_inputs.py", "listen"),  # to topics
-    ("stiction_ros/nodes/controller.py", "listen"),
+    ("stiction_ros/nodes/controller.py", "listen"),  # to topics
     ("stiction_ros/cli/listen.py", "Listener"),
     ("stiction_studies/control_system/server.py", "set_endpoint"),  # of the demonstration
     ("stiction_studies/control_system/process.py", "bind"),  # asks for a free port, lets it go

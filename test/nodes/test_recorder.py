@@ -77,6 +77,8 @@ class Desk:
 
     def health(self) -> tuple[str, dict[str, str]]:
         level, _, values = self.recorder.health()
+        if self.recorder.noticed.level == "error":
+            level = "error"
         return level, {key: str(value) for key, value in values}
 
 

@@ -18,6 +18,7 @@ from std_msgs.msg import String
 
 from stiction_ros.nodes import recorder as recorder_module
 from stiction_ros.nodes.recorder import RecorderNode, free_directory
+from stiction_ros.nodes.shared import managed as managed_module
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_stamp
 from stiction_ros.online.health import Noticed
@@ -29,7 +30,7 @@ from stiction_ros.records.run.loop_runs import read_bag_parts
 def _quick_looks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five looks at the bag a second, and errors that are shown for a second."""
     monkeypatch.setattr(recorder_module, "BAG_PERIOD", 0.2)
-    monkeypatch.setattr(recorder_module, "Noticed", functools.partial(Noticed, shown=1.0))
+    monkeypatch.setattr(managed_module, "Noticed", functools.partial(Noticed, shown=1.0))
 
 
 @pytest.fixture
@@ -84,6 +85,8 @@ class Site:
 
     def health(self) -> tuple[str, str, dict[str, str]]:
         level, said, values = self.recorder.health()
+        if self.recorder.noticed.level == "error":
+            level, said = "error", self.recorder.noticed.text
         return level, said, {key: str(value) for key, value in values}
 
 

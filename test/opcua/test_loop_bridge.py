@@ -12,8 +12,8 @@ from stiction_ros.opcua.loop_bridge import (
     BridgeRules,
     HeardBeat,
     LoopBridge,
-    OwnBeat,
     WriteOrder,
+    beat_of,
     identity_of,
     mode_text,
 )
@@ -199,7 +199,7 @@ def no_plant_beat(plant: Plant) -> None:
 
 
 def other_writer(plant: Plant) -> None:
-    plant.hear(BEAT, good(float(OwnBeat(77).next()), plant.now))
+    plant.hear(BEAT, good(float(beat_of(77, 1)), plant.now))
 
 
 def refused(plant: Plant) -> None:
@@ -300,9 +300,9 @@ def test_a_pending_ask_waits_until_it_can_be_made_or_is_taken_back() -> None:
 
 
 def test_a_writer_that_is_there_already_is_waited_for() -> None:
-    plant, other = Plant(), OwnBeat(77)
-    for _ in range(12):
-        plant.hear(BEAT, good(float(other.next()), plant.now))
+    plant = Plant()
+    for k in range(12):
+        plant.hear(BEAT, good(float(beat_of(77, k)), plant.now))
         plant.run(1)
     assert plant.orders == []
     assert "another" in plant.bridge.grant.reason
@@ -315,7 +315,7 @@ def test_a_give_back_of_another_one_is_not_made() -> None:
     plant.linked = False
     plant.run(2)
     plant.linked = True
-    plant.hear(BEAT, good(float(OwnBeat(77).next()), plant.now))
+    plant.hear(BEAT, good(float(beat_of(77, 1)), plant.now))
     plant.run(2)
     assert plant.requests() == [1.0]  # the request is the other one's by now
 
@@ -335,8 +335,7 @@ def test_limits_of_the_plant_that_are_crossed_are_told_as_such() -> None:
 
 
 def test_beats_bear_the_writer() -> None:
-    beat = OwnBeat(7)
-    beats = [beat.next() for _ in range(70_000)]
+    beats = [beat_of(7, k) for k in range(70_000)]
     assert {identity_of(float(one)) for one in beats} == {7}
     assert len(set(beats[:65_536])) == 65_536
     assert identity_of(-1.0) == -1

@@ -5,7 +5,7 @@ from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
-from small_maps import PV, at, loop_tags
+from small_maps import PV, at
 from test_loop_bridge import Plant
 
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
@@ -19,17 +19,14 @@ class Status:
 
     def __init__(self) -> None:
         self.plant = Plant().granted()
-        outlet = MagicMock()
-        self.topics = LoopTopics(
-            loop_tags(), pv=outlet, applied=outlet, sp=None, dv=None, grant=None
-        )
+        self.topics = LoopTopics(MagicMock(), self.plant.bridge)
         one = np.array([10.0])
         quality = (TagQuality.GOOD,)
         sample = PlantSample(at(0.0), one, one, np.zeros(0), np.zeros(1), quality, one)
         self.topics.publish(sample, "/controller")
 
     def now(self) -> tuple[str, str, dict[str, Any]]:
-        level, text, values = self.topics.health(self.plant.bridge, self.plant.now)
+        level, text, values = self.topics.health(self.plant.now)
         return level, text, dict(values)
 
 

@@ -11,7 +11,6 @@ from stiction_ros.config_files import find_config
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.nodes.shared.runner import unused
 from stiction_ros.online.session import read_nodes
 
 
@@ -27,13 +26,12 @@ def test_the_tuning_of_the_page_moves_the_valve_for_a_reason_only(tmp_path: Path
 def test_the_file_of_the_page_serves_the_launch_file_and_a_start_by_hand(tmp_path: Path) -> None:
     path = tmp_path / "fic101.scenario.yaml"
     path.write_text(scenario_of_the_page(), encoding="utf-8")
-    assert unused(str(path), "/FIC101/controller") == ""
     for node in ("controller", "estimator"):
         assert read_nodes(path, without="plant")[node]["pace"] == "realtime"
     (tmp_path / "fic101.loop.yaml").write_text(find_config("flow.loop.yaml").read_text())
-    nodes = bridged_nodes(path, tmp_path, source="topic:pv")
+    nodes = bridged_nodes(path, tmp_path, "topic:pv")
     assert {key: nodes["controller"][key] for key in TUNING} == {"move_worth": [0.01]}
-    write_parameters(nodes, tmp_path / "p.yaml", any_namespace=True)
+    write_parameters(nodes, tmp_path / "p.yaml")
     again = yaml.safe_load((tmp_path / "p.yaml").read_text())
     assert set(again) == {"/**/recorder", "/**/estimator", "/**/controller"}
 

@@ -13,7 +13,7 @@ from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.page import duration, interval, number
 from stiction_ros.report.record_page import report_record
 from stiction_ros.report.run.identified import valve_cards, verdict_line
-from stiction_ros.report.run.report import headline, write_run
+from stiction_ros.report.run.report import headline, report_run
 from stiction_ros.report.run.story import tell
 from stiction_ros.report.shapes import step_response, true_response
 
@@ -33,7 +33,7 @@ def outside(page: str) -> list[str]:
 
 
 def test_the_report_of_a_run(log: RunLog, tmp_path: Path) -> None:
-    written = write_run(tell(log, name="made_up"), tmp_path / "new" / "folder")
+    written = report_run(log, tmp_path / "new" / "folder")
     page = written.page.read_text(encoding="utf-8")
     assert outside(page) == []
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
@@ -55,13 +55,13 @@ def test_the_report_of_a_run(log: RunLog, tmp_path: Path) -> None:
 
 @pytest.mark.trial
 def test_one_page_alone(log: RunLog, tmp_path: Path) -> None:
-    written = write_run(tell(log), tmp_path / "only.html")
+    written = report_run(log, tmp_path / "only.html")
     assert [path.name for path in tmp_path.iterdir()] == ["only.html"]
     assert written.page.name == "only.html"
 
 
 def test_healthy_valves_are_no_trouble(healthy: RunLog, tmp_path: Path) -> None:
-    page = write_run(tell(healthy), tmp_path).page.read_text(encoding="utf-8")
+    page = report_run(healthy, tmp_path).page.read_text(encoding="utf-8")
     assert "Valve V1 is healthy" in page
     assert 'class="warn"' not in page
     assert "The controller stayed unaware throughout." in page
@@ -70,7 +70,7 @@ def test_healthy_valves_are_no_trouble(healthy: RunLog, tmp_path: Path) -> None:
 def test_a_bag_with_nothing_but_the_signals(log: RunLog, tmp_path: Path) -> None:
     record = dataclasses.replace(log.record, sp=None, stem=None)
     bare = RunLog(record, log.start, (), (), (), (), {"/pv": 1200}, {})
-    written = write_run(tell(bare), tmp_path)
+    written = report_run(bare, tmp_path)
     assert "No fit of the valves" in written.page.read_text(encoding="utf-8")
     page = written.page.read_text(encoding="utf-8")
     assert [title for title in FIGURES if title in page] == ["The whole run"]
@@ -79,7 +79,7 @@ def test_a_bag_with_nothing_but_the_signals(log: RunLog, tmp_path: Path) -> None
 @pytest.mark.trial
 def test_a_sticky_valve_without_a_comparison_is_a_warning(log: RunLog, tmp_path: Path) -> None:
     quiet = dataclasses.replace(log.record, pv=log.record.sp)
-    page = write_run(tell(dataclasses.replace(log, record=quiet)), tmp_path).page
+    page = report_run(dataclasses.replace(log, record=quiet), tmp_path).page
     assert "the loop did not cycle" in page.read_text(encoding="utf-8")
 
 

@@ -83,10 +83,6 @@ class NodeProcesses:
         if plant.returncode != 0:
             raise NodeError(self._describe("plant", plant.returncode))
 
-    def pids(self) -> dict[str, int]:
-        """Return the process ids of the nodes."""
-        return {name: process.pid for name, process in self._processes.items()}
-
     def require_running(self) -> None:
         """Raise NodeError when one of the nodes has ended."""
         for name, process in self._processes.items():

@@ -69,7 +69,7 @@ def in_order(names: Iterable[str], kinds: Sequence[str]) -> list[str]:
 
 
 def bridged_nodes(
-    path: Path, directory: Path, *, speed: float = 1.0, source: str = "opcua"
+    path: Path, directory: Path, source: str, *, speed: float = 1.0
 ) -> dict[str, dict[str, Any]]:
     """Return the parameters of the nodes of a loop whose plant is behind a bridge, or elsewhere.
 
@@ -85,10 +85,7 @@ def bridged_nodes(
     return {name: nodes[name] for name in others}
 
 
-def write_parameters(
-    nodes: Mapping[str, Mapping[str, Any]], path: Path, *, any_namespace: bool = False
-) -> None:
-    """Write a ROS parameter file for ``nodes``, which may be in a namespace."""
-    prefix = "/**/" if any_namespace else "/"
-    document = {f"{prefix}{n}": {"ros__parameters": dict(v)} for n, v in nodes.items()}
+def write_parameters(nodes: Mapping[str, Mapping[str, Any]], path: Path) -> None:
+    """Write a ROS parameter file for ``nodes``, which may be in any namespace."""
+    document = {f"/**/{n}": {"ros__parameters": dict(v)} for n, v in nodes.items()}
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")

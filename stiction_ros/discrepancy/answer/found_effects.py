@@ -9,7 +9,7 @@ import numpy as np
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.data.gate import DataFinding
 from stiction_ros.discrepancy.decision.decide import GapVerdict
-from stiction_ros.discrepancy.decision.extend import AddedEffect
+from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.uncertainty import Intervals
 from stiction_ros.discrepancy.gap.measure import (

@@ -9,11 +9,11 @@ from stiction_ros.discrepancy.candidate.base import Candidate
 from stiction_ros.discrepancy.data.controller_check import ControllerCheck, ControllerStatus
 from stiction_ros.discrepancy.data.gate import SHOWN, Gate
 from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict
+from stiction_ros.discrepancy.decision.explanation import ProcessChange
 from stiction_ros.discrepancy.decision.scores import Scores, Testable
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import OutputGap, OutputNoise
 from stiction_ros.discrepancy.gap.where import Where
-from stiction_ros.discrepancy.process.change import ProcessChange
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import Behaviour, Offset, TimeShift, Tuning, behaviours
 from stiction_ros.loop import LoopModel

@@ -2,7 +2,7 @@
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -81,7 +81,7 @@ class Candidate(ABC):
         """Return the response for points of shape (G, axes), in values."""
 
     @abstractmethod
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour | None:
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour | None:
         """Return the effect with these figures; None outside the catalogue."""
 
     def count(self, point: FloatArray) -> int:
@@ -248,6 +248,11 @@ class Candidate(ABC):
 def figures_of(behaviour: Behaviour) -> dict[str, float]:
     """Return the parameters of an effect by key, in engineering units."""
     return {p.key: float(getattr(behaviour, p.attribute)) for p in behaviour.parameters()}
+
+
+def spans_of(figures: Sequence[Mapping[str, float]]) -> dict[str, tuple[float, float]]:
+    """Return between which values each of several sets of parameters lies."""
+    return {key: (min(f[key] for f in figures), max(f[key] for f in figures)) for key in figures[0]}
 
 
 LEAST_LAG = 2.5  # times the shortest lag that is searched, a fifth of a sample

@@ -82,7 +82,7 @@ class FilterCandidate(OutputCandidate):
         """Return the outputs of the filters, shape (N, G), as late as they come."""
         return values
 
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         return self.kind.from_mapping({self.kind.parameters()[0].key: float(point[0])})
 
 
@@ -118,7 +118,7 @@ class GainCandidate(OutputCandidate):
         """Refuse a process that hardly answers at all: that is a valve that does not move."""
         return abs(float(factors[0])) >= LEAST_CHANGE and 1.0 + float(factors[0]) >= LEAST_GAIN
 
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         return ProcessGain(float(np.clip(1.0 + factors[0], 0.01, 100.0)))
 
 
@@ -164,7 +164,7 @@ class _Decoy(OutputCandidate):
 
     inside: bool = False
 
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour | None:
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour | None:
         return None
 
 

@@ -21,7 +21,7 @@ ON_OUTPUTS = ("process", "disturbance", "sensor")
 class _Plugged(Candidate):
     """A behaviour by its own axes, wherever it acts."""
 
-    plugged: type[Behaviour]  # the behaviour
+    kind: type[Behaviour]  # the behaviour
     # at which PV surprises most, s; first values of a figure that is a moment
     moments: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(0))
 
@@ -30,17 +30,17 @@ class _Plugged(Candidate):
 
     @property
     def about(self) -> type[Behaviour]:
-        return self.plugged
+        return self.kind
 
     @property
     def law(self) -> str | None:
-        return self.plugged.law
+        return self.kind.law
 
     def possible(self, points: FloatArray) -> BoolArray:
-        return possible(self.plugged, points)
+        return possible(self.kind, points)
 
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
-        return made(self.plugged, point)
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
+        return made(self.kind, point)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,14 +50,7 @@ class PluggedValve(_Plugged, ValveCandidate):
     @classmethod
     def of(cls, run: FreeRun, valve: int, kind: type[Behaviour]) -> Self:
         """Return the candidate of a behaviour at a valve by its index."""
-        return cls(
-            place=f"valve:{run.model.valves[valve].name}",
-            effect=kind.effect,
-            axes=axes_of(kind, seen_of(run, run.stems[:, valve])),
-            valve=valve,
-            kind=kind,
-            plugged=kind,
-        )
+        return cls.at(run, valve, kind, axes_of(kind, seen_of(run, run.stems[:, valve])))
 
     def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
         """Return stem positions, shape (N, G), %; OP where the figures are not possible."""
@@ -88,12 +81,12 @@ class PluggedLoad(_Plugged):
             axes=axes_of(kind, seen_of(run, np.zeros(len(run.runs)))),
             dated=is_dated(kind),
             valve=valve,
-            plugged=kind,
+            kind=kind,
             moments=moments,
         )
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
-        wave = simulated(run, self.plugged, points, np.zeros(len(run.runs)))
+        wave = simulated(run, self.kind, points, np.zeros(len(run.runs)))
         entering = run.stems[:, self.valve, None] + wave
         reached = [i for i in range(run.forced.shape[1]) if run.responses.reaches(i, self.valve)]
         shifts = {i: run.drive(i, self.valve, entering) - run.forced[:, i : i + 1] for i in reached}
@@ -114,7 +107,7 @@ class PluggedOutput(_Plugged, OutputCandidate):
             effect=kind.effect,
             dated=is_dated(kind),
             output=output,
-            plugged=kind,
+            kind=kind,
             moments=moments,
         )
         return dataclasses.replace(bare, axes=axes_of(kind, seen_of(run, bare.signal(run))))
@@ -129,7 +122,7 @@ class PluggedOutput(_Plugged, OutputCandidate):
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         incoming = self.signal(run)
         return Response(
-            {self.output: simulated(run, self.plugged, points, incoming) - incoming[:, None]},
+            {self.output: simulated(run, self.kind, points, incoming) - incoming[:, None]},
             possible=self.possible(points),
         )
 

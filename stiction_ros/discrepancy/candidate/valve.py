@@ -2,8 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Callable
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -33,7 +32,6 @@ from stiction_ros.effects import (
 )
 from stiction_ros.effects.behaviour import BoolArray
 
-Rows = Callable[[FloatArray], FloatArray]
 LARGEST = 0.95  # of the span of OP: what never moves the stem cannot be told
 SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best point
 LEAST_BEND = 0.01  # of what a valve travels: straighter is a gain
@@ -57,16 +55,12 @@ class ValveCandidate(Candidate):
     kind: type[Behaviour]  # the behaviour
 
     @classmethod
-    def at(cls, run: FreeRun, valve: int, kind: type[Behaviour], axes: tuple[Axis, ...]) -> Self:
+    def at(
+        cls, run: FreeRun, valve: int, kind: type[Behaviour], axes: tuple[Axis, ...], **more: Any
+    ) -> Self:
         """Return the candidate at a valve by its index, with the figures that are searched."""
-        return cls(
-            place=f"valve:{run.model.valves[valve].name}",
-            effect=kind.effect,
-            axes=axes,
-            needle=kind is HeStiction,
-            valve=valve,
-            kind=kind,
-        )
+        place = f"valve:{run.model.valves[valve].name}"
+        return cls(place=place, effect=kind.effect, axes=axes, valve=valve, kind=kind, **more)
 
     @property
     def law(self) -> str | None:
@@ -127,7 +121,7 @@ class ValveCandidate(Candidate):
             possible=None if possible.all() else possible,
         )
 
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         row = self.rows(point[None, :])[0]
         values = dict(zip((p.key for p in self.kind.parameters()), row.tolist(), strict=False))
         return self.kind.from_mapping(values)
@@ -219,12 +213,7 @@ class LagCandidate(OneFigure):
 class SlewCandidate(OneFigure):
     """A slew by its rate and the place of the stem at the start."""
 
-    reach: float = 0.0  # how far off OP it may be at the start, %
-
-    @classmethod
-    def within(cls, run: FreeRun, valve: int, axes: tuple[Axis, ...], reach: float) -> Self:
-        """Return the candidate at a valve by its index, its stem that near OP at the start."""
-        return dataclasses.replace(cls.at(run, valve, Slew, axes), reach=reach)
+    reach: float  # how far off OP it may be at the start, %
 
     def lead(self, point: FloatArray) -> float:
         return self.reach * float(point[1])
@@ -255,8 +244,11 @@ class CubicCandidate(ValveCandidate):
         return bool(bent and np.all(np.diff(curve) > 0.0))
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class SaturationCandidate(ValveCandidate):
     """A stem that stops short of what OP asks, at one end or both."""
+
+    limits: tuple[float, float]  # of the valve itself, %
 
     def rows(self, points: FloatArray) -> FloatArray:
         return np.column_stack([np.minimum(points[:, 0], points[:, 1]), points.max(axis=1)])
@@ -276,14 +268,13 @@ class SaturationCandidate(ValveCandidate):
     def reference(self, seen: Seen) -> tuple[float, ...]:
         return self.axes[0].low, float(np.quantile(seen.values, 0.95))
 
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         """Return the saturation; an end that OP never reaches is the valve's, if any."""
         low, high = self.rows(point[None, :])[0].tolist()
-        ends = run.model.limits[self.valve].tolist()
-        if low <= self.axes[0].low and np.isfinite(ends[0]):
-            low = ends[0]
-        if high >= self.axes[1].high and np.isfinite(ends[1]):
-            high = ends[1]
+        if low <= self.axes[0].low and np.isfinite(self.limits[0]):
+            low = self.limits[0]
+        if high >= self.axes[1].high and np.isfinite(self.limits[1]):
+            high = self.limits[1]
         return Saturation(low, high)
 
 
@@ -319,50 +310,28 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     low, high = float(op.min()), float(op.max())
     # A controller that winds up spends most of its time beyond the stem's end.
     lower, upper = np.quantile(op, [0.95, 0.05]).tolist()
-    # He's slips depend on f_S and f_D to the last digits: its optimum is a needle.
     start = Axis(-1.0, 1.0, 1)
-    fine = (
-        Axis(0.01 * span, LARGEST * span, 160, logarithmic=True),
-        Axis(0.0, 1.0, 17, natural=True),
-        start,
-    )
-    rough = (
-        Axis(0.01 * span, LARGEST * span, 50, logarithmic=True),
-        Axis(0.0, 1.0, 9, natural=True),
-    )
+    away = Axis(-2.0 * span, 2.0 * span, 1, linear=True)
+    late = late_axes(any(run.runs.between[j : j + 1]))
+
+    def sizes(least: float, most: float, count: int) -> Axis:
+        return Axis(least, most, count, logarithmic=True)
+
+    # He's slips depend on f_S and f_D to the last digits: its optimum is a needle.
+    fine = sizes(0.01 * span, LARGEST * span, 160), Axis(0.0, 1.0, 17, natural=True), start
+    rough = sizes(0.01 * span, LARGEST * span, 50), Axis(0.0, 1.0, 9, natural=True), start
+    bands = sizes(0.02 * span, 1.8 * span, 24), start
+    rates = sizes(0.003 * fastest, 0.95 * fastest, 24), start
+    ends = Axis(low, lower, 14, natural=True), Axis(upper, high, 14, natural=True)
+    bends = Axis(-40.0, 40.0, 17), Axis(-30.0, 30.0, 1, linear=True)
+    limits = tuple(run.model.limits[j].tolist())
     return [
-        StictionCandidate.at(run, j, HeStiction, fine),
-        StictionCandidate.at(run, j, XchStiction, (*rough, start)),
-        BacklashCandidate.at(
-            run, j, Backlash, (Axis(0.02 * span, 1.8 * span, 24, logarithmic=True), start)
-        ),
-        SlewCandidate.within(
-            run, j, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True), start), span
-        ),
-        LagCandidate.at(
-            run,
-            j,
-            Lag,
-            (
-                lag_axis(run),
-                Axis(-2.0 * span, 2.0 * span, 1, linear=True),
-                *late_axes(any(run.runs.between[j : j + 1])),
-            ),
-        ),
-        SaturationCandidate.at(
-            run,
-            j,
-            Saturation,
-            (Axis(low, lower, 14, natural=True), Axis(upper, high, 14, natural=True)),
-        ),
+        StictionCandidate.at(run, j, HeStiction, fine, needle=True),
+        StictionCandidate.at(run, j, XchStiction, rough),
+        BacklashCandidate.at(run, j, Backlash, bands),
+        SlewCandidate.at(run, j, Slew, rates, reach=span),
+        LagCandidate.at(run, j, Lag, (lag_axis(run), away, *late)),
+        SaturationCandidate.at(run, j, Saturation, ends, limits=limits),
         ValveCandidate.at(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),
-        CubicCandidate(
-            place=f"valve:{run.model.valves[j].name}",
-            effect=CubicCharacteristic.effect,
-            axes=(Axis(-40.0, 40.0, 17), Axis(-30.0, 30.0, 1, linear=True)),
-            valve=j,
-            kind=CubicCharacteristic,
-            low=low,
-            high=high,
-        ),
+        CubicCandidate.at(run, j, CubicCharacteristic, bends, low=low, high=high),
     ]

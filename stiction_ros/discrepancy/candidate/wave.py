@@ -1,105 +1,89 @@
-"""Disturbances where they enter: beside the stem of a valve, or on an output."""
+"""Disturbances: shapes in time that enter beside the stem of a valve, or on an output."""
 
 import dataclasses
-from typing import Self
+import math
+from abc import abstractmethod
+from typing import Any, Self
 
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
-from stiction_ros.discrepancy.candidate.waves import (
-    FASTEST,
-    DriftWave,
-    ShapedWave,
-    SineWave,
-    StepWave,
-    Wave,
-)
-from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, left_by, projector
+from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
+from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
 from stiction_ros.discrepancy.simulation.free_run import SMALL, FreeRun
 from stiction_ros.effects import (
+    Axis,
     Behaviour,
+    DriftDisturbance,
     FloatArray,
     Seen,
+    SineDisturbance,
     SquareDisturbance,
+    StepDisturbance,
     TriangleDisturbance,
-    about,
 )
 from stiction_ros.signals.autoregression import TINY
 
+LOAD, DISTURBANCE = "load", "disturbance"
+FASTEST = 0.45  # cycles per sample
+SHAPED = FASTEST / 3.0  # of a square or a triangle: its third harmonic has to be seen
+SLOWEST = 2.0  # cycles in the longest record
+BESIDE = (-0.5, -0.25, 0.0, 0.25, 0.5)  # of the width of a spectral line
+PHASES = 8
+A_FREQUENCY = 3
+"""Figures that a frequency counts as: what n samples tell of it grows with n³, of others with n
+(P. M. Djurić, A model selection rule for sinusoids in white Gaussian noise, IEEE Transactions on
+Signal Processing 44, 1996)."""
 PEAKS, STANDING_OUT = 6, 3
 NEIGHBOURS = 51  # frequencies, half a spectral line apart, whose median a line is held against
 SURPRISES = 12
 SAME = 1e-3  # of a wave's length, that another one and the start of the record may leave of it
+_TURN = 2.0 * math.pi
 
-# What no record of OP and PV tells from a disturbance of an output, or from a load.
-_AT_SENSOR = {"step": "bias_step", "drift": "drift"}
-_IN_VALVE = {"step": "offset"}
+# What no record of OP and PV tells from a shape at a place.
+_TWINS = {
+    (DISTURBANCE, StepDisturbance.effect): ("sensor", "bias_step"),
+    (DISTURBANCE, DriftDisturbance.effect): ("sensor", "drift"),
+    (LOAD, StepDisturbance.effect): ("valve", "offset"),
+}
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class WaveCandidate(Candidate):
-    """A wave that enters somewhere."""
+    """A shape in time, its size found by least squares, that enters at one place."""
 
-    wave: Wave  # its shape
     index: int  # of the output that it is added to, or of the valve beside which it enters
+    sample_time: float  # s
+    length: int  # of the longest record, samples
+    factors: int = 1
 
     @classmethod
-    def of(cls, place: str, index: int, wave: Wave, twins: tuple[tuple[str, str], ...]) -> Self:
-        """Return the candidate of a shape at a place, and what is not told from it."""
+    def at(cls, run: FreeRun, kind: str, index: int, effect: str, **more: Any) -> Self:
+        """Return the shape on an output, or beside the stem of a valve, by its index."""
+        tag = (run.model.valve_names if kind == LOAD else run.model.outputs)[index]
+        twin = _TWINS.get((kind, effect))
         return cls(
-            place=place,
-            effect=wave.effect,
-            axes=wave.axes,
-            factors=wave.factors,
-            twins=twins,
-            dated=wave.dated,
-            sharp=isinstance(wave, SineWave | ShapedWave | StepWave),
-            wave=wave,
+            place=f"{kind}:{tag}",
+            effect=effect,
+            twins=((f"{twin[0]}:{tag}", twin[1]),) if twin else (),
             index=index,
+            sample_time=run.runs.sample_time,
+            length=run.runs.longest.stop - run.runs.longest.start,
+            **more,
         )
 
-    def count(self, point: FloatArray) -> int:
-        return super().count(point) + self.wave.further
+    @abstractmethod
+    def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        """Return the waves of size one, shape (N, G, factors), for points (G, axes)."""
 
-    def grid(self) -> FloatArray:
-        return self.wave.grid()
-
-    def reference(self, seen: Seen) -> tuple[float, ...]:
-        """Return figures of engineering size: ten periods, or the middle of the records."""
-        if isinstance(self.wave, SineWave | ShapedWave):
-            return (10.0 / len(seen.values),)
-        return about(self.effect).reference(seen)
-
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
-        return self.wave.behaviour(point, factors)
-
-
-class DisturbanceCandidate(WaveCandidate):
-    """A wave that is added to one output."""
-
-    @classmethod
-    def on(cls, run: FreeRun, output: int, wave: Wave) -> Self:
-        """Return the candidate of an output by its index."""
-        tag, same = run.model.outputs[output], _AT_SENSOR.get(wave.effect)
-        return cls.of(
-            f"disturbance:{tag}", output, wave, ((f"sensor:{tag}", same),) if same else ()
-        )
+    def entering(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        """Return what of the waves enters a process, as :meth:`columns` returns them."""
+        return self.columns(run, points)
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
-        return Response({}, {self.index: self.wave.columns(run, points)})
-
-
-class LoadCandidate(WaveCandidate):
-    """A wave that enters the process beside the stem of one valve, % of travel."""
-
-    @classmethod
-    def beside(cls, run: FreeRun, valve: int, wave: Wave) -> Self:
-        """Return the candidate of a valve by its index."""
-        tag, same = run.model.valves[valve].name, _IN_VALVE.get(wave.effect)
-        return cls.of(f"load:{tag}", valve, wave, ((f"valve:{tag}", same),) if same else ())
-
-    def respond(self, run: FreeRun, points: FloatArray) -> Response:
-        waves = self.wave.entering(run, points)
+        if self.place.startswith(DISTURBANCE):
+            return Response({}, {self.index: self.columns(run, points)})
+        waves = self.entering(run, points)
         count, size, factors = waves.shape
         entering = run.stems[:, self.index, None] + SMALL * waves.reshape(count, -1)
         sizes = {}
@@ -109,6 +93,152 @@ class LoadCandidate(WaveCandidate):
                 moved -= run.forced[:, i : i + 1]
                 sizes[i] = (moved / SMALL).reshape(count, size, factors)
         return Response({}, sizes)
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class StepCandidate(WaveCandidate):
+    """A step at one moment."""
+
+    moments: FloatArray  # at which PV surprises most, s
+    dated: bool = True
+    sharp: bool = True
+
+    @classmethod
+    def of(cls, run: FreeRun, kind: str, index: int, moments: FloatArray) -> Self:
+        """Return the step as it is searched in a record."""
+        last = float(run.runs.time.max())
+        axes = (Axis(0.02 * last, 0.98 * last, 60, natural=True),)
+        return cls.at(run, kind, index, StepDisturbance.effect, axes=axes, moments=moments)
+
+    def grid(self) -> FloatArray:
+        axis = self.axes[0]
+        moments = np.clip(self.moments, axis.low, axis.high)
+        return np.unique(np.concatenate([axis.grid(), moments]))[:, None]
+
+    def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        late = run.runs.time[:, None] >= points[:, 0] - 1e-9
+        return late.astype(float)[:, :, None]
+
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
+        onset = float(np.ceil(point[0] / self.sample_time - 1e-9)) * self.sample_time
+        return StepDisturbance(onset, float(factors[0]))
+
+
+class DriftCandidate(WaveCandidate):
+    """A ramp from the first sample on."""
+
+    def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        return run.runs.time[:, None, None]
+
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
+        return DriftDisturbance(float(factors[0]))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class LineCandidate(WaveCandidate):
+    """A wave that is searched near the lines of the gap's own spectrum."""
+
+    lines: FloatArray  # of the gap, cycles per sample
+    sharp: bool = True
+
+    def near(self, fastest: float) -> FloatArray:
+        """Return frequencies on and beside the lines, shape (K,)."""
+        width = 1.0 / self.length
+        beside = self.lines[:, None] + np.array(BESIDE) * width
+        return np.unique(np.clip(beside, SLOWEST * width, fastest))
+
+    def count(self, point: FloatArray) -> int:
+        return super().count(point) + A_FREQUENCY - 1
+
+    def reference(self, seen: Seen) -> tuple[float, ...]:
+        """Return ten periods in the records."""
+        return (10.0 / len(seen.values),)
+
+
+class SineCandidate(LineCandidate):
+    """A sine."""
+
+    @classmethod
+    def of(cls, run: FreeRun, kind: str, index: int, lines: FloatArray) -> Self:
+        """Return the sine as it is searched in a record."""
+        axes = (_frequencies(run, FASTEST),)
+        name = SineDisturbance.effect
+        return cls.at(run, kind, index, name, axes=axes, factors=2, lines=lines)
+
+    def grid(self) -> FloatArray:
+        return self.near(FASTEST)[:, None]
+
+    def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        return self._at(run.runs.time / self.sample_time, points)
+
+    def entering(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        """Return the waves amid each sample, next to their means."""
+        return self._at(run.runs.time / self.sample_time + 0.5, points)
+
+    def _at(self, time: FloatArray, points: FloatArray) -> FloatArray:
+        angle = _TURN * time[:, None] * points[:, 0]
+        return np.stack([np.sin(angle), np.cos(angle)], axis=2)
+
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
+        phase = float(np.arctan2(factors[1], factors[0]))
+        return SineDisturbance(float(np.hypot(*factors)), self.sample_time / float(point[0]), phase)
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class ShapedCandidate(LineCandidate):
+    """A square or a triangle, by its frequency and where in its cycle it is amid the record.
+
+    Where it begins would follow its frequency: what is searched apart has to be told apart.
+    """
+
+    shape: type[SquareDisturbance | TriangleDisturbance]  # the behaviour
+
+    @classmethod
+    def of(
+        cls,
+        run: FreeRun,
+        kind: str,
+        index: int,
+        lines: FloatArray,
+        shape: type[SquareDisturbance | TriangleDisturbance],
+    ) -> Self:
+        """Return the wave as it is searched in a record."""
+        axes = (_frequencies(run, SHAPED), Axis(-0.5, 1.0, 3 * PHASES + 1, natural=True))
+        return cls.at(run, kind, index, shape.effect, axes=axes, lines=lines, shape=shape)
+
+    @property
+    def middle(self) -> float:
+        """The middle of the record, samples."""
+        return 0.5 * self.length
+
+    def grid(self) -> FloatArray:
+        """Return half a turn of phases: a negative amplitude is the other half."""
+        meshed = np.meshgrid(self.near(SHAPED), np.arange(PHASES) / (2.0 * PHASES), indexing="ij")
+        return np.stack([each.ravel() for each in meshed], axis=1)
+
+    def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        return self.shape.wave(self._angles(run, points))[:, :, None]
+
+    def entering(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        """Return the means over each sample: a square changes sides between samples, too."""
+        held = self.shape.held(self._angles(run, points), _TURN * points[None, :, 0])
+        return held[:, :, None]
+
+    def _angles(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        at = run.runs.time[:, None] / self.sample_time - self.middle
+        return np.asarray(_TURN * (at * points[:, 0] + points[:, 1]))
+
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
+        size = float(factors[0])
+        begun = float(point[1] - self.middle * point[0])
+        phase = _TURN * (begun + (0.5 if size < 0.0 else 0.0))
+        turned = math.remainder(phase, _TURN)
+        return self.shape(abs(size), self.sample_time / float(point[0]), turned)
+
+
+def _frequencies(run: FreeRun, fastest: float) -> Axis:
+    width = 1.0 / (run.runs.longest.stop - run.runs.longest.start)
+    return Axis(SLOWEST * width, fastest, 2 * int(fastest / width))
 
 
 def disturbance_candidates(
@@ -125,20 +255,13 @@ def disturbance_candidates(
         whitened: per output the innovations, shape (N,).
     """
     found: list[Candidate] = []
-    part = run.runs.longest
-    lowest = 3.0 / (part.stop - part.start)
     for i in range(gap.shape[1]):
-        moments = surprises(run, [whitened[i]])
-        lines = spectral_lines([gap[part, i], whitened[i][part]], lowest)
-        found += [DisturbanceCandidate.on(run, i, wave) for wave in _waves(run, moments, lines)]
+        found += _shapes(run, DISTURBANCE, i, gap[:, [i]], [whitened[i]])
     for j in range(len(run.model.valves)):
         reached = [i for i in range(gap.shape[1]) if run.responses.reaches(i, j)]
         if not reached:
             continue
-        moments = surprises(run, [whitened[i] for i in reached])
-        values = [each for i in reached for each in (gap[part, i], whitened[i][part])]
-        waves = _waves(run, moments, spectral_lines(values, lowest))
-        for load in (LoadCandidate.beside(run, j, wave) for wave in waves):
+        for load in _shapes(run, LOAD, j, gap[:, reached], [whitened[i] for i in reached]):
             same = _not_told(run, load, found)
             if same is None:
                 found.append(load)
@@ -147,30 +270,32 @@ def disturbance_candidates(
     return found
 
 
-def _waves(run: FreeRun, moments: FloatArray, lines: FloatArray) -> list[Wave]:
+def _shapes(
+    run: FreeRun, kind: str, index: int, gaps: FloatArray, whitened: list[FloatArray]
+) -> list[WaveCandidate]:
+    """Return every shape at one place, by the gaps of the outputs that it reaches, shape (N, q)."""
+    part = run.runs.longest
+    values = [v[part] for pair in zip(gaps.T, whitened, strict=True) for v in pair]
+    lines = spectral_lines(values, 3.0 / (part.stop - part.start))
     return [
-        StepWave.of(run, moments),
-        DriftWave(),
-        SineWave.of(run, lines),
-        ShapedWave.of(run, lines, SquareDisturbance),
-        ShapedWave.of(run, lines, TriangleDisturbance),
+        StepCandidate.of(run, kind, index, surprises(run, whitened)),
+        DriftCandidate.at(run, kind, index, DriftDisturbance.effect),
+        SineCandidate.of(run, kind, index, lines),
+        ShapedCandidate.of(run, kind, index, lines, SquareDisturbance),
+        ShapedCandidate.of(run, kind, index, lines, TriangleDisturbance),
     ]
 
 
-def _not_told(run: FreeRun, load: LoadCandidate, found: list[Candidate]) -> int | None:
+def _not_told(run: FreeRun, load: WaveCandidate, found: list[Candidate]) -> int | None:
     """Return the place of the disturbance that no record tells from a load; None if all do."""
     point = load.values(load.grid()[:1])
     response = load.respond(run, point)
     if load.effect not in ("drift", "sine") or len(response.outputs) != 1:
         return None
     (output,) = response.outputs
-    place, same = next(
-        (k, each)
-        for k, each in enumerate(found)
-        if isinstance(each, DisturbanceCandidate)
-        and (each.index, each.effect) == (output, load.effect)
-    )
-    wave = same.wave.columns(run, point)[:, 0]
+    key = f"{DISTURBANCE}:{run.model.outputs[output]}", load.effect
+    place, same = next((k, each) for k, each in enumerate(found) if each.key == key)
+    wave = same.respond(run, point).sizes[output][:, 0]
     basis = projector(np.hstack([wave, run.free[output]]))
     left = left_by(basis, response.sizes[output][:, 0])
     told = float(np.sum(left**2)) > SAME**2 * float(np.sum(response.sizes[output] ** 2))

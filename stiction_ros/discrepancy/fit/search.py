@@ -18,7 +18,6 @@ from stiction_ros.discrepancy.likelihood.noise import (
     noise_forms,
     shared_factors,
 )
-from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Behaviour, FloatArray
 
 LEADERS = 4
@@ -63,9 +62,10 @@ class CandidateFit:
         """By how much it beats the current model on all rows: fitted ones and foretold ones."""
         return self.delta_bic + self.held_gain
 
-    def behaviour(self, run: FreeRun) -> Behaviour | None:
-        """Return the effect with its figures; None outside the catalogue."""
-        return self.candidate.behaviour(run, self.point, self.factors)
+    @property
+    def behaviour(self) -> Behaviour | None:
+        """The effect with its figures; None outside the catalogue."""
+        return self.candidate.behaviour(self.point, self.factors)
 
 
 def fit_candidate(

@@ -2,14 +2,20 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from stiction_ros.discrepancy.decision.extend import AddedEffect, open_columns, run_with
+from stiction_ros.discrepancy.decision.explanation import (
+    AddedEffect,
+    Explanation,
+    ProcessChange,
+    open_columns,
+    refit_together,
+    run_with,
+)
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap_options import MARGIN
-from stiction_ros.discrepancy.likelihood.noise import left_by
+from stiction_ros.discrepancy.likelihood.least_squares import left_by
 from stiction_ros.discrepancy.process.free_equation import Equation
 from stiction_ros.discrepancy.process.refit import equations_of, process_with, with_equations
 from stiction_ros.discrepancy.process.slower import GAIN, Changeable
@@ -30,64 +36,15 @@ NEAR = 0.99  # of the largest change, from which on a figure lies on its bound
 Tried = tuple[float, BoolArray, FloatArray, FloatArray, tuple[AddedEffect, ...]]
 
 
-@dataclasses.dataclass(frozen=True)
-class ProcessChange:
-    """One figure of the process that is another than the model says."""
-
-    output: str  # tag
-    what: str  # ``gain``, ``time_constant``, ``lead`` (the time constant of a zero) or ``delay``
-    # factor of the gain or of a time constant; seconds of dead time beyond the model's, negative
-    # for less
-    value: float
-    interval: tuple[float, float]  # 95 %
-    unit: str  # of the value
-    model: float | None = None  # the model's own time constant, s; None for the others
-
-    @property
-    def sentence(self) -> str:
-        """What it says, for people, such as ``dead time 2 s shorter than in the model``."""
-        low, high = self.interval
-        if self.what == "delay":
-            side = "longer" if self.value > 0.0 else "shorter"
-            low, high = sorted((abs(low), abs(high)))
-            said = f"dead time {abs(self.value):.3g} s {side} than in the model"
-            return f"{said} (95 % between {low:.3g} and {high:.3g} s)"
-        if self.model is None:
-            said = f"gain {self.value:.3g} times that of the model"
-            return f"{said} (95 % between {low:.3g} and {high:.3g})"
-        kind = "lead" if self.what == "lead" else "time constant"
-        now, low, high = (self.model * each for each in (self.value, low, high))
-        if low <= 0.0:
-            return f"no {kind} of {self.model:.3g} s, or one below {high:.3g} s (95 %)"
-        said = f"{kind} {now:.3g} s, in the model {self.model:.3g} s"
-        return f"{said} (95 % between {low:.3g} and {high:.3g} s)"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the entry of ``process_changes`` in ``gap --json``."""
-        return dataclasses.asdict(self) | {"interval": list(self.interval)}
-
-
-@dataclasses.dataclass(frozen=True)
-class ChangedProcess:
-    """A model whose process follows the records better."""
-
-    model: LoopModel  # without effects
-    changes: tuple[ProcessChange, ...]  # figures that were changed
-    # that stand beside it, those that are smooth at their best behind it
-    effects: tuple[AddedEffect, ...]
-    # per output what a unit of each figure that was changed moves, shape (N, figures)
-    slopes: tuple[FloatArray, ...]
-
-
 def changed_process(
     bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect], declared: bool = True
-) -> ChangedProcess | None:
-    """Return the model with gain, time constants and dead time at their best behind effects.
+) -> Explanation | None:
+    """Return effects behind a process with gain, time constants and dead time at their best.
 
     The gain of an output, each of its time constants and its dead time are stepped by
     Gauss-Newton on the likelihood, together with what stands in for them: the figures of effects
     that are smooth, as the curve of a valve, and linear ones. One figure after the other that is
-    not surely another than the model's goes back to it.
+    not surely another than the model's goes back to it. The effects are fitted again at last.
 
     Args:
         bare: the model without effects.
@@ -111,19 +68,19 @@ def changed_process(
         model, beside = search.changed(search.values), search.effects
         changes += search.changes(name)
         slopes.append(search.slopes())
-    return ChangedProcess(model, tuple(changes), beside, tuple(slopes)) if changes else None
+    if not changes:
+        return None
+    fitted = refit_together(model, runs, beside) if beside else ()
+    return Explanation.of(model, runs, fitted, tuple(changes), tuple(slopes))
 
 
-def _stepped(effect: AddedEffect, run: FreeRun, more: float) -> AddedEffect:
+def _stepped(effect: AddedEffect, more: float) -> AddedEffect:
     """Return an effect with ``more`` of its first figure, in coordinates of its search."""
     candidate, point = effect.fit.candidate, effect.fit.point.copy()
     axis = candidate.axes[0]
     moved = axis.outer(np.array([axis.inner(float(point[0])) + more]))
     point[0] = np.clip(moved[0], axis.low, axis.high)
-    fit = dataclasses.replace(effect.fit, point=point)
-    behaviour = fit.behaviour(run)
-    assert behaviour is not None
-    return dataclasses.replace(effect, fit=fit, behaviour=behaviour)
+    return dataclasses.replace(effect, fit=dataclasses.replace(effect.fit, point=point))
 
 
 class _Search:
@@ -225,7 +182,7 @@ class _Search:
             self.values = self.values + moved
             more = np.clip(step[count:], -LARGEST_STEP, LARGEST_STEP).tolist()
             for k, each in zip(self.smooth, more, strict=True):
-                self.effects = self._with_stepped(run, k, each)
+                self.effects = self._with_stepped(k, each)
             settled = np.all(np.abs(moved) < TINY_STEP * self.probes)
             if settled and all(abs(each) < TINY_STEP * PROBE for each in more):
                 break
@@ -249,12 +206,12 @@ class _Search:
         moved = [self._of_figures(run, gap)]
         model = run.model if not self.smooth else self.changed(self.values)
         for k in self.smooth:
-            other = run_with(model, self.runs, self._with_stepped(run, k, PROBE))
+            other = run_with(model, self.runs, self._with_stepped(k, PROBE))
             moved.append((other.gap[:, self.output] - gap) / PROBE)
         return np.column_stack(moved)
 
-    def _with_stepped(self, run: FreeRun, k: int, more: float) -> tuple[AddedEffect, ...]:
-        other = _stepped(self.effects[k], run, more)
+    def _with_stepped(self, k: int, more: float) -> tuple[AddedEffect, ...]:
+        other = _stepped(self.effects[k], more)
         return (*self.effects[:k], other, *self.effects[k + 1 :])
 
     def _run(self, values: FloatArray) -> FreeRun:

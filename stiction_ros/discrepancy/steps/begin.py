@@ -8,6 +8,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.controller_check import check_controller, unseen_of
 from stiction_ros.discrepancy.data.gate import DataFinding, open_gate
+from stiction_ros.discrepancy.decision.explanation import Explanation
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap_options import GapOptions
@@ -59,7 +60,7 @@ def begin(
     )
     if runs is not base.run.runs:
         base = Baseline.of(FreeRun(model, runs))
-    return task, State(given=bare, bare=bare, before=base, base=base)
+    return task, State(given=bare, before=base, now=Explanation(bare, base))
 
 
 def _between(model: LoopModel) -> tuple[bool, ...]:

@@ -48,7 +48,7 @@ from stiction_ros.discrepancy.process.refit import open_figures
 from stiction_ros.discrepancy.steps.look import MOVED_AWAY, explained
 from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import whole, with_laws
+from stiction_ros.discrepancy.steps.wholes import with_laws
 from stiction_ros.effects import FloatArray, from_mapping
 from stiction_ros.signals.autoregression import gain_of_noise
 
@@ -65,30 +65,31 @@ def closing(task: Task, looked: State) -> Discrepancy:
         assert state.doubted is not None
         looked = settle(task, state.doubted)
         state, found = _named(task, looked)
-    before, after = free_run_gap(state.before), free_run_gap(state.base)
+    before, after = free_run_gap(state.before), free_run_gap(state.now.base)
     louder = [] if _explained_by_no_name(task, looked, state) else _louder(task, state)
     shown, answers = [of_data(finding) for finding in task.data], [*found, *louder]
     effects = [*shown, *answers]
     verdict, alternatives = overall(shown, answers, state.looks, state.testable)
-    model = state.bare
-    for named, added in zip(found, state.added, strict=True):
+    model = state.now.bare
+    for named, added in zip(found, state.now.effects, strict=True):
         model = model.with_effect(added.place, added.behaviour, **_provenance(task, named))
     for noise in louder:
         behaviour = from_mapping({"effect": noise.effect} | dict(noise.parameters))
         model = model.with_effect(noise.place, behaviour, **_provenance(task, noise))
-    noises = check_noise(state.base)
-    kept = {e.fit.candidate.key for e in state.added}
+    noises = check_noise(state.now.base)
+    kept = {e.fit.candidate.key for e in state.now.effects}
     no_names = [
-        called(*e.fit.candidate.key) for e in looked.added if e.fit.candidate.key not in kept
+        called(*e.fit.candidate.key) for e in looked.now.effects if e.fit.candidate.key not in kept
     ]
-    if verdict is GapVerdict.UNKNOWN and state.changes:
-        gained = state.before.bic - state.base.bic + state.base.held_gain(state.before)
+    if verdict is GapVerdict.UNKNOWN and state.now.changes:
+        base = state.now.base
+        gained = state.before.bic - base.bic + base.held_gain(state.before)
         if max(fit.evidence for fit in state.looks[-1].scores.fits) < LEFT * gained:
             verdict = effects[0].verdict if effects else GapVerdict.NONE
     silent = not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE)
-    if silent and (no_names or _taken_back(task, state) or _noise_left(task, state, noises)):
+    if silent and (no_names or _taken_back(task, state) or _noise_left(state, noises)):
         verdict = GapVerdict.UNKNOWN
-    if state.changes and silent and verdict is not GapVerdict.UNKNOWN:
+    if state.now.changes and silent and verdict is not GapVerdict.UNKNOWN:
         verdict = GapVerdict.NAMED
     told = {(e.place, e.effect) for e in effects} | {n for e in effects for n in e.alternatives}
     told |= set(alternatives)
@@ -103,10 +104,10 @@ def closing(task: Task, looked: State) -> Discrepancy:
             t for t in state.testable if not t.testable and (t.place, t.effect) not in told
         ),
         noise=noises,
-        process_changes=state.changes,
+        process_changes=state.now.changes,
         before=before,
         after=after,
-        closed=closed_share(before, after) if state.added or state.changes else 0.0,
+        closed=closed_share(before, after) if state.now.effects or state.now.changes else 0.0,
         model_before=task.model,
         model_after=model,
         looks=state.looks,
@@ -114,7 +115,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
         controller=task.controller,
         runs=task.runs,
         base_before=state.before,
-        base_after=state.base,
+        base_after=state.now.base,
         seconds=time.perf_counter() - task.begun,
         notes=(*task.gate.notes, *(n for r in task.runs.records for n in r.notes)),
     )
@@ -136,7 +137,7 @@ def _where(
         found += [stem.sentence for stem in look_at_stems(state.before.run)]
         found += [sentence for look in state.looks[:1] for sentence in look.where.sentences]
     found += noise_sentences(check_noise(state.before), task.runs.sample_time)
-    if state.added:
+    if state.now.effects:
         left = noise_sentences(noises, task.runs.sample_time)
         found += [f"beside what was found, {sentence}" for sentence in left]
     last = state.looks[-1].decision
@@ -155,26 +156,27 @@ def _named(task: Task, state: State) -> tuple[State, list[FoundEffect]]:
         found = _found(task, state)
         no_name = [
             k
-            for k, (shown, effect) in enumerate(zip(found, state.added, strict=True))
-            if holds_nothing_out(effect, state.base, shown.intervals) or shown.closed < CLOSES
+            for k, (shown, effect) in enumerate(zip(found, state.now.effects, strict=True))
+            if holds_nothing_out(effect, state.now.base, shown.intervals) or shown.closed < CLOSES
         ]
         if not no_name:
             return state, found
-        state = state.with_added(task.runs, state.others(no_name[-1]))
+        state = state.holding(state.now.others(no_name[-1]))
 
 
 def _found(task: Task, state: State) -> list[FoundEffect]:
     """Return what is told of every effect."""
-    without = [state.beside(task.runs, k) for k in range(len(state.added))]
+    now = state.now
+    without = [now.beside(k) for k in range(len(now.effects))]
     moved: list[list[FloatArray]] = []
     if len(without) > 1:
-        pairs = zip(without, state.added, strict=True)
+        pairs = zip(without, now.effects, strict=True)
         moved = [otherwise(base, effect.fit) for base, effect in pairs]
-    slopes = [list(state.slopes)] if state.slopes else []
+    slopes = [list(now.slopes)] if now.slopes else []
     if task.options.process_fitted:
-        slopes = [open_figures(state.base.run)]
+        slopes = [open_figures(now.base.run)]
     found = []
-    for k, effect in enumerate(state.added):
+    for k, effect in enumerate(now.effects):
         others = [*moved[:k], *moved[k + 1 :], *slopes]
         beside = [np.hstack(columns) for columns in zip(*others, strict=True)]
         told = FoundEffect(
@@ -187,14 +189,14 @@ def _found(task: Task, state: State) -> list[FoundEffect]:
             effect.fit.delta_bic,
             own_closed(
                 without[k],
-                state.base,
+                now.base,
                 dated=effect.fit.candidate.dated,
                 given=not task.options.process_fitted,
             ),
             verdict_of(effect.effect, effect.alternatives),
             effect.alternatives,
             reason_for(effect, state.looks),
-            moved_by(without[k], state.base),
+            moved_by(without[k], now.base),
         )
         found.append(told)
     return found
@@ -211,11 +213,11 @@ def _intervals(
         beside: per output what these, and what of the process was changed, would do by other
             figures, shape (N, q).
     """
-    effect = state.added[k]
+    effect = state.now.effects[k]
     if task.options.quick:
         return without_its_jump(likelihood_intervals(base, effect.fit, beside), effect)
     done = task.options.most_effects / (task.options.most_effects + 1)
-    part = (1.0 - done) / len(state.added)
+    part = (1.0 - done) / len(state.now.effects)
 
     def report(share: float) -> None:
         task.report(done + (k + share) * part)
@@ -228,12 +230,10 @@ def _intervals(
 
 def _explained_by_no_name(task: Task, looked: State, state: State) -> bool:
     """Tell whether effects that are no names explain as much as a noise does in their stead."""
-    if len(looked.added) == len(state.added):
+    if len(looked.now.effects) == len(state.now.effects):
         return False
     margin = task.options.margin
-    with_them = whole(looked.bare, task.runs, looked.added)
-    instead = with_laws(whole(state.bare, task.runs, state.added))
-    return with_them.worth(margin) < instead.worth(margin) + margin
+    return looked.now.worth(margin) < with_laws(state.now).worth(margin) + margin
 
 
 def _louder(task: Task, state: State) -> list[FoundEffect]:
@@ -243,18 +243,16 @@ def _louder(task: Task, state: State) -> list[FoundEffect]:
     what a law misses wanders as a noise does, and is said without a name.
     """
     found: list[FoundEffect] = []
-    if any(on_the_way(each.place, each.effect) for each in state.added):
+    now, base = state.now, state.now.base
+    if any(on_the_way(each.place, each.effect) for each in now.effects):
         return found
-    for i, declared in enumerate(declared_noise(state.base.run.model)):
-        fit = state.base.noise[i]
-        if declared is None or not fit.enlarged:
+    for i, declared in enumerate(declared_noise(base.run.model)):
+        fit = base.noise[i]
+        if declared is None or not fit.enlarged or not _matters(state, i):
             continue
-        if not _matters(task, state, i):
-            continue
-        beside = state.added or state.changes
-        laws = noise_effects(state.base, i, declared, A_ROW if beside else 0.0)
+        laws = noise_effects(base, i, declared, A_ROW if now.effects or now.changes else 0.0)
         if laws and laws[0].score < fit.bic(0) + fit.held_minus_two_log - _stranger(state, laws[0]):
-            own = state.base.under_declared(i)
+            own = base.under_declared(i)
             found.append(of_noise(laws, own.bic(0) + own.held_minus_two_log, task.options.margin))
     return found
 
@@ -274,10 +272,10 @@ def _stranger(state: State, law: NoiseEffect) -> float:
     return -NO_LAW
 
 
-def _noise_left(task: Task, state: State, noises: tuple[OutputNoise, ...]) -> bool:
+def _noise_left(state: State, noises: tuple[OutputNoise, ...]) -> bool:
     """Tell whether noise is left that no law tells, and that is large enough to matter."""
     return any(
-        (each.memory and (not state.changes or _matters(task, state, i))) or _drowned(state, i)
+        (each.memory and (not state.now.changes or _matters(state, i))) or _drowned(state, i)
         for i, each in enumerate(noises)
     )
 
@@ -290,27 +288,28 @@ def _taken_back(task: Task, state: State) -> list[CandidateFit]:
 
 def _drowned(state: State, output: int) -> bool:
     """Tell whether values that were thinned out leave far more than the declared noise."""
-    run = state.base.run
+    run = state.now.base.run
     declared = declared_noise(run.model)[output]
     if declared is None or not run.runs.thinned[output]:
         return False
-    rows = state.base.blocks[output].train
-    left = float(np.std(state.base.noise[output].residual[rows]))
+    rows = state.now.base.blocks[output].train
+    left = float(np.std(state.now.base.noise[output].residual[rows]))
     return left > DROWNED * declared.std * math.sqrt(gain_of_noise(declared.ar))
 
 
-def _matters(task: Task, state: State, output: int) -> bool:
+def _matters(state: State, output: int) -> bool:
     """Tell whether what is left of an output is large enough to be an effect.
 
     A model of the field is never exact: beside a large effect it leaves a little of its own.
     """
-    rows = state.base.blocks[output].train
+    now = state.now
+    rows = now.base.blocks[output].train
     before, after = (
-        float(np.std(base.noise[output].residual[rows])) for base in (state.before, state.base)
+        float(np.std(base.noise[output].residual[rows])) for base in (state.before, now.base)
     )
-    if not spans_steps(state.base, output):
+    if not spans_steps(now.base, output):
         return False
-    return not (state.added or state.changes) or after > BESIDE * before
+    return not (now.effects or now.changes) or after > BESIDE * before
 
 
 def _provenance(task: Task, effect: FoundEffect) -> dict[str, object]:

@@ -1,7 +1,7 @@
 """One look: every candidate scored, one effect added if the scores allow a name for it."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -16,16 +16,17 @@ from stiction_ros.discrepancy.decision.decide import (
     thinned_away,
     told_by_stem,
 )
-from stiction_ros.discrepancy.decision.extend import (
+from stiction_ros.discrepancy.decision.explanation import (
     AddedEffect,
-    Extension,
-    extend,
-    held_rows_bear_out,
+    Explanation,
     left_open,
-    moved_away,
     refit_together,
     run_with,
-    tangents,
+)
+from stiction_ros.discrepancy.decision.extend import (
+    extend,
+    held_rows_bear_out,
+    moved_away,
     told_already,
 )
 from stiction_ros.discrepancy.decision.scores import (
@@ -40,8 +41,7 @@ from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.process.refit import open_figures, refitted_behind
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import changed_again, made_room, process_first
-from stiction_ros.loop import LoopModel
+from stiction_ros.discrepancy.steps.wholes import changed_again, process_first
 
 TURNS = 2  # in which a fitted process and the effects before it are fitted again
 SCORED = 0.8  # of the time of a look
@@ -60,15 +60,15 @@ def look_on(task: Task, state: State) -> State:
     than the declared noise, it is taken back.
     """
     state = dataclasses.replace(state, testable=())
-    for k in range(len(state.added), task.options.most_effects):
+    for k in range(len(state.now.effects), task.options.most_effects):
         state = look(task, state, k)
         if not state.looks[-1].kept:
             break
     if not explained(state):
         assert state.doubted is not None
         state = state.doubted
-    while state.added and state.earlier and moved_away(state.before, state.base):
-        state = withdrawn(task, state)
+    while state.now.effects and state.earlier and moved_away(state.before, state.now.base):
+        state = withdrawn(state)
     return state
 
 
@@ -79,23 +79,21 @@ def look(task: Task, state: State, k: int) -> State:
     if mended is not None:
         return look(task, mended, k)
     decision = decided(task, state, scores)
-    room, bare, step = _extended(task, state, decision)
-    kept, reason = (step.kept, step.reason) if step else (False, decision.reason)
+    grown, reason = _extended(task, state, decision)
+    kept = grown is not None
     own = Look(scores, decision, locate(scores.base), kept, reason)
     testable = testable_effects(scores.base, list(scores.candidates), task.options.margin)
-    doubted = state.doubted
-    if kept:
-        given_up = dataclasses.replace(own, kept=False, reason=decision.reason)
-        stays = dataclasses.replace(state, testable=testable, looks=(*state.looks, given_up))
-        doubted = doubted or (None if decision.inseparable else stays)
-    seen = dataclasses.replace(
-        room if kept else state, testable=testable, looks=(*state.looks, own), doubted=doubted
-    )
-    if not (step and kept):
+    seen = dataclasses.replace(state, testable=testable, looks=(*state.looks, own))
+    if grown is None:
         return seen
-    earlier = (*seen.earlier, seen.bare)
-    grown = dataclasses.replace(seen, bare=bare, base=step.base, added=step.added, earlier=earlier)
-    return changed_again(task, grown)
+    given_up = dataclasses.replace(own, kept=False, reason=decision.reason)
+    refused = dataclasses.replace(seen, looks=(*state.looks, given_up))
+    doubted = state.doubted or (None if decision.inseparable else refused)
+    same = grown.changes is state.now.changes  # elsewhere the process was changed beside it
+    earlier = (*state.earlier, state.now.bare) if same else (grown.bare,)
+    seen = dataclasses.replace(seen, now=grown, earlier=earlier, doubted=doubted)
+    again = changed_again(task, seen, grown.effects)
+    return seen if again is None else seen.behind(again)
 
 
 def explained(state: State) -> bool:
@@ -106,42 +104,44 @@ def explained(state: State) -> bool:
     """
     if state.doubted is None:
         return True
-    if len(state.added) < 2 or max(state.base.run.runs.thinned) > 0.0:
+    base, before = state.now.base, state.doubted.now.base
+    if len(state.now.effects) < 2 or max(base.run.runs.thinned) > 0.0:
         return False
-    gained = state.doubted.base.score - state.base.score
+    gained = before.score - base.score
     refused = state.doubted.looks[-1]
     if refused.decision.lent is not None:
         rivals = [fit.evidence for fit in refused.scores.fits if not fit.candidate.inside]
         if gained < max(rivals, default=0.0):
             return False
-        if not held_rows_bear_out(state.doubted.base, state.base, dated=False):
+        if not held_rows_bear_out(before, base, dated=False):
             return False
-    return gained > max(state.base.score_under_declared - state.base.score, 0.0)
+    return gained > max(base.score_under_declared - base.score, 0.0)
 
 
-def withdrawn(task: Task, state: State) -> State:
+def withdrawn(state: State) -> State:
     """Take the last effect back: with it the free run is farther from PV than before."""
     last = max(k for k, each in enumerate(state.looks) if each.kept)
     ended = dataclasses.replace(state.looks[last], kept=False, reason=MOVED_AWAY)
-    before = dataclasses.replace(
+    before = dataclasses.replace(state.now, bare=state.earlier[-1])
+    return dataclasses.replace(
         state,
-        bare=state.earlier[-1],
+        now=before.holding(state.now.effects[:-1]),
         earlier=state.earlier[:-1],
         looks=(*state.looks[:last], ended, *state.looks[last + 1 :]),
     )
-    return before.with_added(task.runs, state.added[:-1])
 
 
 def scored_by(task: Task, state: State, k: int) -> Scores:
     """Score every candidate against the model as it is after k looks."""
     share = 1.0 / (task.options.most_effects + 1)
-    base, fitted = state.base, task.options.process_fitted
-    if state.added or fitted:
-        slopes = tangents(state.bare, task.runs, state.added)
+    now, fitted = state.now, task.options.process_fitted
+    base = now.base
+    if now.effects or fitted:
+        slopes = now.tangents()
         if fitted:
             own = open_figures(base.run)
             slopes = [np.hstack(pair) for pair in zip(slopes, own, strict=True)]
-        base = left_open(base, state.added, slopes)
+        base = left_open(base.run, now.effects, slopes)
     candidates = all_candidates(base, task.controller.clock_known)
     if fitted:
         candidates = tuple(each for each in candidates if not each.absorbed)
@@ -149,7 +149,7 @@ def scored_by(task: Task, state: State, k: int) -> Scores:
     def report(done: float) -> None:
         task.report((k + SCORED * done) * share)
 
-    beside = left_open(state.base, state.added, state.slopes) if state.slopes else None
+    beside = left_open(now.base.run, now.effects, now.slopes) if now.slopes else None
     return score_candidates(base, candidates, report, beside=beside)
 
 
@@ -162,7 +162,7 @@ def decided(task: Task, state: State, scores: Scores) -> Decision:
     base = scores.base
     measured = 1.0 - min(max(task.runs.thinned), MOST_THINNED)
     possible = not_contradicted(base.run, scores.fits)
-    allowed = [fit for fit in possible if not told_already(state.added, fit)]
+    allowed = [fit for fit in possible if not told_already(state.now.effects, fit)]
     margin, rests = task.options.margin, rests_left(base.run)
     decision = decide(allowed, margin / measured, rests)
     if measured < 1.0 and decision.verdict is GapVerdict.NONE:
@@ -182,25 +182,26 @@ def rests_left(run: FreeRun) -> Callable[[CandidateFit], int]:
     return lambda fit: departures(run, fit.candidate, fit.point)
 
 
-def _extended(
-    task: Task, state: State, decision: Decision
-) -> tuple[State, LoopModel, Extension | None]:
-    """Return the state, the model behind, and the extension by the chosen effect, if it may be."""
-    chosen = decision.chosen
-    lent = chosen is None and state.doubted is None and not task.options.process_fitted
+def _extended(task: Task, state: State, decision: Decision) -> tuple[Explanation | None, str]:
+    """Return the explanation with the chosen effect; None where there is none, and why."""
+    chosen, now, fitted = decision.chosen, state.now, task.options.process_fitted
+    lent = chosen is None and state.doubted is None and not fitted
     if lent:
         chosen = decision.lent
-    if chosen is None or (task.options.process_fitted and not decision.inseparable):
-        return state, state.bare, None
-    behaviour = chosen.behaviour(state.base.run)
-    assert behaviour is not None
-    room, new = made_room(task, state, AddedEffect(chosen, behaviour, decision.alternatives))
-    bare, effects = room.bare, [*room.added, new]
-    for _ in range(TURNS if task.options.process_fitted else 0):
-        bare = refitted_behind(bare, run_with(bare, task.runs, effects))
+    if chosen is None or (fitted and not decision.inseparable):
+        return None, decision.reason
+    effects: Sequence[AddedEffect]
+    effects = (*now.effects, AddedEffect(chosen, decision.alternatives))
+    process = changed_again(task, state, effects)
+    if process is None:
+        process = now
+    else:
+        effects = process.effects
+    for _ in range(TURNS if fitted else 0):
+        bare = refitted_behind(process.bare, run_with(process.bare, task.runs, effects))
+        process = dataclasses.replace(process, bare=bare)
         effects = refit_together(bare, task.runs, effects)
-    *others, new = effects
-    return room, bare, extend(bare, task.runs, others, new, state.base, lent=lent)
+    return extend(process, effects, now.base, lent=lent)
 
 
 def _in_doubt_of_place(base: Baseline, decision: Decision) -> Decision:

@@ -11,11 +11,12 @@ from stiction_ros.discrepancy.decision.decide import (
     large_enough,
     not_contradicted,
 )
-from stiction_ros.discrepancy.decision.extend import AddedEffect, refit_together, told_already
+from stiction_ros.discrepancy.decision.explanation import AddedEffect
+from stiction_ros.discrepancy.decision.extend import told_already
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.steps.look import look_on, scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import Keys, best_whole, mended, singles, whole
+from stiction_ros.discrepancy.steps.wholes import Keys, best_whole, mended, singles
 from stiction_ros.effects import Backlash, about
 
 APART = 5.0  # samples between a step and its opposite that are outliers together
@@ -31,18 +32,17 @@ def settle(task: Task, state: State) -> State:
     other = mended(task, state)
     if other is not None:
         state = best_of_wholes(task, look_on(task, other))
-    return told_again(task, state) if len(state.added) > 1 else state
+    return told_again(task, state) if len(state.now.effects) > 1 else state
 
 
 def best_of_wholes(task: Task, state: State) -> State:
     """Keep the best whole explanation: a part of what was found, or one effect alone."""
     alone = [each for each in singles(state) if confirmed(each.fit)]
-    best = best_whole(state.bare, task.runs, state.added, alone, task.options.margin)
-    state = dataclasses.replace(state, added=best.effects, base=best.base)
-    kept = without_outliers(state.added, task.runs.sample_time)
-    if len(kept) == len(state.added):
-        return state
-    return state.with_added(task.runs, refit_together(state.bare, task.runs, kept))
+    best = best_whole(state.now, alone, task.options.margin)
+    kept = without_outliers(best.effects, task.runs.sample_time)
+    if len(kept) < len(best.effects):
+        best = best.refitted(kept)
+    return dataclasses.replace(state, now=best)
 
 
 def without_outliers(effects: Sequence[AddedEffect], sample_time: float) -> tuple[AddedEffect, ...]:
@@ -99,37 +99,30 @@ def told_again(task: Task, state: State) -> State:
     of the others were fitted beside it. The whole that explains most holds; those within the
     margin are in doubt.
     """
-    for k in range(len(state.added)):
+    for k in range(len(state.now.effects)):
         state = _told(task, state, k)
     return state
 
 
 def _told(task: Task, state: State, k: int) -> State:
-    own, margin = state.added[k], task.options.margin
-    tried = [(own, state)]
+    own, margin = state.now.effects[k], task.options.margin
+    tried = [(own, state.now)]
     twins, rivals = _rivals(task, state, k)
     for rival in rivals:
-        behaviour = rival.behaviour(state.base.run)
-        if behaviour is None:
-            continue
-        other = AddedEffect(rival, behaviour, rival.candidate.twins)
-        added = (*state.added[:k], other, *state.added[k + 1 :])
-        refitted = refit_together(state.bare, task.runs, added)
-        tried.append((other, state.with_added(task.runs, refitted)))
-    scores = [0.0]
-    if len(tried) > 1:
-        scores = [whole(each.bare, task.runs, each.added).score for _, each in tried]
-    least = min(scores)
-    best, kept = tried[scores.index(least)]
+        other = AddedEffect(rival, rival.candidate.twins)
+        added = (*state.now.effects[:k], other, *state.now.effects[k + 1 :])
+        tried.append((other, state.now.refitted(added)))
+    best, kept = min(tried, key=lambda each: each[1].score)
     near = [
         key
-        for (each, _), score in zip(tried, scores, strict=True)
-        if each is not best and score < least + margin
+        for each, whole in tried
+        if each is not best and whole.score < kept.score + margin
         for key in each.fit.candidate.keys
     ]
     alternatives = tuple(dict.fromkeys([*_inseparable(best, twins), *near]))
-    told = dataclasses.replace(kept.added[k], alternatives=alternatives)
-    return dataclasses.replace(kept, added=(*kept.added[:k], told, *kept.added[k + 1 :]))
+    told = dataclasses.replace(kept.effects[k], alternatives=alternatives)
+    effects = (*kept.effects[:k], told, *kept.effects[k + 1 :])
+    return dataclasses.replace(state, now=dataclasses.replace(kept, effects=effects))
 
 
 def _inseparable(effect: AddedEffect, twins: Keys) -> list[tuple[str, str]]:
@@ -148,13 +141,13 @@ def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]
 
     Both are asked beside the others as they are.
     """
-    own = state.added[k].fit.candidate
-    others = state.with_added(task.runs, state.others(k))
+    own = state.now.effects[k].fit.candidate
+    others = state.holding(state.now.others(k))
     scores = scored_by(task, others, task.options.most_effects)
     fits = not_contradicted(scores.base.run, scores.fits)
     mine = max((f.evidence for f in fits if f.candidate.key == own.key), default=0.0)
     twins = next((f.candidate.twins for f in fits if f.candidate.key == own.key), ())
-    known = {own.key, *(each.fit.candidate.key for each in others.added)}
+    known = {own.key, *(each.fit.candidate.key for each in others.now.effects)}
     alike = [
         f
         for f in sorted(fits, key=lambda f: -f.evidence)
@@ -163,7 +156,7 @@ def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]
         and f.evidence > max(mine - NEAR, 0.0)
         and confirmed(f)
         and large_enough(f)
-        and not told_already(others.added, f)
+        and not told_already(others.now.effects, f)
         and not (own.about.family == f.candidate.about.family == FRICTION)
     ]
     return twins, alike[:RIVALS]

@@ -2,20 +2,18 @@
 
 import dataclasses
 import itertools
-import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from stiction_ros.discrepancy.decision.decide import large_enough, on_the_way
-from stiction_ros.discrepancy.decision.extend import AddedEffect, base_with, refit_together
+from stiction_ros.discrepancy.decision.explanation import AddedEffect, Explanation, ProcessChange
 from stiction_ros.discrepancy.decision.scores import Scores
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import spans_steps
 from stiction_ros.discrepancy.gap.noise_effects import noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.process.change import ChangedProcess, ProcessChange, changed_process
-from stiction_ros.discrepancy.simulation.free_run import Runs
+from stiction_ros.discrepancy.process.change import changed_process
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.loop import LoopModel
 
 INEXACT = 0.01
 """Share of what all effects gain that each has to gain beside the margin: no plant obeys a law to
@@ -26,69 +24,51 @@ SINGLES = 4  # effects of the first look that are tried alone against several to
 BEHIND = 3  # effects that are tried behind another process where none was found
 
 
-@dataclasses.dataclass(frozen=True)
-class Whole:
-    """One explanation: the effects of a model, and the noise that is left."""
+class ToldNoise(NamedTuple):
+    """An explanation whose larger noise is told by laws, where that is better."""
 
-    effects: tuple[AddedEffect, ...]  # fitted together
-    base: Baseline  # of the model with them
-    score: float  # −2 log likelihood of fitted and held-out rows, and the price of all figures
-    laws: Keys = ()  # places and effects by which its larger noise is told, where that is better
+    whole: Explanation
+    gained: float  # −2 log likelihood that the laws gain
+    laws: Keys  # their places and effects
 
     def worth(self, margin: float) -> float:
-        """Return what is to be least: an effect more must gain the margin."""
-        return self.score + margin * len(self.effects)
+        """Return what is to be least."""
+        return self.whole.worth(margin) - self.gained
 
 
-def whole(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> Whole:
-    """Return the explanation by effects with their present figures, in a model without them."""
-    base = base_with(bare, runs, effects)
-    score = sum(fit.bic(0) + fit.held_minus_two_log for fit in base.noise)
-    rows = max(fit.rows for fit in base.noise)
-    figures = sum(each.fit.candidate.count(each.fit.point) for each in effects)
-    return Whole(tuple(effects), base, score + figures * math.log(max(rows, 2)))
-
-
-def with_laws(found: Whole) -> Whole:
-    """Return the explanation with its larger noise told by a law, where that is better."""
-    score, names = found.score, list(found.laws)
-    declared = declared_noise(found.base.run.model)
-    for i, (fit, own) in enumerate(zip(found.base.noise, declared, strict=True)):
-        if own is None or not fit.enlarged or not spans_steps(found.base, i):
+def with_laws(whole: Explanation) -> ToldNoise:
+    """Return an explanation with its larger noise told by laws, where that is better."""
+    gained, names = 0.0, []
+    base = whole.base
+    declared = declared_noise(base.run.model)
+    for i, (fit, own) in enumerate(zip(base.noise, declared, strict=True)):
+        if own is None or not fit.enlarged or not spans_steps(base, i):
             continue
-        laws = noise_effects(found.base, i, own)
-        if laws and (gained := laws[0].score - fit.bic(0) - fit.held_minus_two_log) < 0.0:
-            score += gained
+        laws = noise_effects(base, i, own)
+        if laws and (more := fit.bic(0) + fit.held_minus_two_log - laws[0].score) > 0.0:
+            gained += more
             names.append((laws[0].place, laws[0].behaviour.effect))
-    return dataclasses.replace(found, score=score, laws=tuple(names))
+    return ToldNoise(whole, gained, tuple(names))
 
 
-def best_whole(
-    bare: LoopModel,
-    runs: Runs,
-    added: Sequence[AddedEffect],
-    singles: Sequence[AddedEffect],
-    margin: float,
-) -> Whole:
+def best_whole(now: Explanation, singles: Sequence[AddedEffect], margin: float) -> Explanation:
     """Return the best of all subsets of what was found, and of single effects in its stead.
 
     Args:
-        bare, runs: the model without any effect, and the records.
-        added: what was found, one after the other.
+        now: what was found, one effect after the other.
         singles: effects of the first look that may explain alone what took several.
         margin: that every further effect has to gain, beside a share of what all gain.
     """
-    tried, price = [whole(bare, runs, added)], margin
+    tried, price, added = [now], margin, now.effects
     if added:
-        tried.append(whole(bare, runs, ()))
+        tried.append(now.holding(()))
     if len(added) > 1:
         price += INEXACT * max(tried[1].score - tried[0].score, 0.0)
         for count in range(1, len(added)):
-            for part in itertools.combinations(added, count):
-                tried.append(whole(bare, runs, refit_together(bare, runs, part)))
+            tried += [now.refitted(part) for part in itertools.combinations(added, count)]
         known = {each.fit.candidate.key for each in added}
         others = [each for each in singles if each.fit.candidate.key not in known][:SINGLES]
-        tried += [whole(bare, runs, [alone]) for alone in others]
+        tried += [now.holding([alone]) for alone in others]
     least = min(each.worth(price) for each in tried)
     loads = not any(on_the_way(each.place, each.effect) for each in added)
     near = [
@@ -97,54 +77,27 @@ def best_whole(
         if each.worth(price) < least + LAWS or (loads and not each.effects)
     ]
     best = min(near, key=lambda each: each.worth(price))
-    if not best.effects and best.laws:
-        return _as_well_as_noise(best, near, margin)
-    if len(best.effects) != 1 or len(added) < 2:
-        return best
-    close = [
-        other.effects[0].fit.candidate.keys
-        for other in near
-        if len(other.effects) == 1 and other.worth(margin) < best.worth(margin) + margin
-    ]
-    return dataclasses.replace(best, effects=(_in_doubt(best.effects[0], close),))
+    alone = [each for each in near if len(each.whole.effects) == 1]
+    close = [each for each in alone if each.worth(margin) < best.worth(margin) + margin]
+    if not best.whole.effects and best.laws:
+        # A noise bends as it has to; an effect of few figures that leaves no more is not taken
+        # back for it.
+        close = [each for each in close if not any(fit.enlarged for fit in each.whole.base.noise)]
+        rival = min(close, key=lambda each: each.worth(margin), default=None)
+        return best.whole if rival is None else _in_doubt(rival.whole, best.laws)
+    if len(best.whole.effects) != 1 or len(added) < 2:
+        return best.whole
+    keys = [key for each in close for key in each.whole.effects[0].fit.candidate.keys]
+    return _in_doubt(best.whole, keys)
 
 
-def _as_well_as_noise(noise: Whole, near: Sequence[Whole], margin: float) -> Whole:
-    """Return one effect, in doubt with a noise that explains as much; the noise where none does.
-
-    A noise bends as it has to; an effect of few figures that leaves no more is not taken back
-    for it.
-    """
-    rivals = [
-        each
-        for each in near
-        if len(each.effects) == 1
-        and not any(fit.enlarged for fit in each.base.noise)
-        and each.worth(margin) < noise.worth(margin) + margin
-    ]
-    if not rivals:
-        return noise
-    best = min(rivals, key=lambda each: each.worth(margin))
-    return dataclasses.replace(best, effects=(_in_doubt(best.effects[0], [noise.laws]),))
-
-
-def _in_doubt(effect: AddedEffect, rivals: Sequence[Keys]) -> AddedEffect:
-    """Return an effect with the rivals that explain as much alone."""
-    names = [*effect.alternatives, *(name for keys in rivals for name in keys)]
+def _in_doubt(whole: Explanation, rivals: Sequence[tuple[str, str]]) -> Explanation:
+    """Return one effect with the rivals that explain as much alone."""
+    (effect,) = whole.effects
     own = (effect.place, effect.effect)
-    others = tuple(name for name in dict.fromkeys(names) if name != own)
-    return dataclasses.replace(effect, alternatives=others)
-
-
-@dataclasses.dataclass(frozen=True)
-class Mended:
-    """An explanation behind a process that was changed."""
-
-    changed: ChangedProcess  # the process
-    whole: Whole  # the effects behind it
-    # as of a whole, the changes included: together they have to gain the margin, and each figure
-    # has its price
-    worth: float
+    names = dict.fromkeys([*effect.alternatives, *rivals])
+    others = tuple(name for name in names if name != own)
+    return dataclasses.replace(whole, effects=(dataclasses.replace(effect, alternatives=others),))
 
 
 def suspicious(base: Baseline) -> bool:
@@ -154,53 +107,20 @@ def suspicious(base: Baseline) -> bool:
     )
 
 
-def best_with_process(
-    bare: LoopModel,
-    runs: Runs,
-    added: Sequence[AddedEffect],
-    singles: Sequence[AddedEffect],
-    margin: float,
-) -> Mended | None:
-    """Return the best explanation with another process and all, one, or none of the effects.
-
-    Args:
-        bare, runs: the model without any effect, and the records.
-        added: what was found with the process as it is.
-        singles: effects that may stand alone beside another process, though none was found.
-        margin: that the changes together have to gain.
-    """
-    parts: list[tuple[AddedEffect, ...]] = [(), *((each,) for each in (*added, *singles))]
-    if len(added) > 1:
-        parts.append(tuple(added))
-    found = [with_process(bare, runs, part, margin) for part in parts]
-    return min((each for each in found if each), key=lambda each: each.worth, default=None)
-
-
-def with_process(
-    bare: LoopModel, runs: Runs, part: Sequence[AddedEffect], margin: float
-) -> Mended | None:
+def with_process(task: Task, state: State, part: Sequence[AddedEffect]) -> Explanation | None:
     """Return the explanation by some effects behind a process that is changed for them.
 
     It is changed under the declared noise and under the larger one that is found: what is there
     besides may be steps or a walk, and the one or the other shows the process.
-
-    The changes together have to gain the margin.
     """
-    grounds = (True, False) if any(declared_noise(bare)) else (False,)
-    found = [
-        _behind(changed, runs, margin)
-        for declared in grounds
-        if (changed := changed_process(bare, runs, part, declared)) is not None
-    ]
-    return min(found, key=lambda each: each.worth, default=None)
+    grounds = (True, False) if any(declared_noise(state.given)) else (False,)
+    found = [changed_process(state.given, task.runs, part, declared) for declared in grounds]
+    return _best(task, found)
 
 
-def _behind(changed: ChangedProcess, runs: Runs, margin: float) -> Mended:
-    """Return the explanation by effects that are fitted again behind a changed process."""
-    effects = refit_together(changed.model, runs, changed.effects) if changed.effects else ()
-    own = whole(changed.model, runs, effects)
-    rows = max(fit.rows for fit in own.base.noise)
-    return Mended(changed, own, own.worth(margin) + price_of(changed.changes, rows, margin))
+def _best(task: Task, found: Sequence[Explanation | None]) -> Explanation | None:
+    whole = [each for each in found if each is not None]
+    return min(whole, key=lambda each: each.worth(task.options.margin), default=None)
 
 
 def same_thing(changes: Sequence[ProcessChange], effects: Sequence[str]) -> bool:
@@ -212,39 +132,29 @@ def same_thing(changes: Sequence[ProcessChange], effects: Sequence[str]) -> bool
     return len(whats) == 1 and whats <= set(effects)
 
 
-def price_of(changes: Sequence[ProcessChange], rows: int, margin: float) -> float:
-    """Return what changes of the process cost: the margin together, and each its price in BIC."""
-    return margin + len(changes) * math.log(max(rows, 2)) if changes else 0.0
-
-
 def mended(task: Task, state: State) -> State | None:
     """Return the state behind another process, where that, beside fewer effects, explains more.
 
     A model that was fitted to another record is never exact: what its errors leave looks
-    like effects. Effects that have a name give way to it by the margin only.
+    like effects. Effects that have a name give way to it by the margin only. Behind the process
+    all effects, one or none of them are tried, and where there are none, those that explain most
+    alone.
     """
-    if not suspicious(state.base):
+    if not suspicious(state.now.base):
         return None
-    margin = task.options.margin
-    now = whole(state.bare, task.runs, state.added)
-    rest = [] if state.added else singles(state)[:BEHIND]
-    found = best_with_process(state.given, task.runs, state.added, rest, margin)
-    due = margin if state.added else 0.0
-    if found is None or found.worth >= now.worth(margin) + _price(task, state, now) - due:
+    margin, added = task.options.margin, state.now.effects
+    parts = [(), *((each,) for each in added or singles(state)[:BEHIND])]
+    parts += [added] if len(added) > 1 else []
+    found = _best(task, [with_process(task, state, part) for part in parts])
+    due = margin if added else 0.0
+    if found is None or found.worth(margin) >= state.now.worth(margin) - due:
         return None
-    names = [each.effect for each in state.added] or _left_in_doubt(state)
-    if same_thing(found.changed.changes, names):
+    names = [each.effect for each in added] or _left_in_doubt(state)
+    if same_thing(found.changes, names):
         return None
-    other = dataclasses.replace(
-        state,
-        bare=found.changed.model,
-        changes=found.changed.changes,
-        slopes=found.changed.slopes,
-        earlier=(),
-        opened=len(state.looks),
-    )
     # Where no effect was in the model, the looks have to find it.
-    return other.with_added(task.runs, found.whole.effects if state.added else ())
+    other = state.behind(found if added else found.holding(()))
+    return dataclasses.replace(other, opened=len(state.looks))
 
 
 def process_first(task: Task, state: State, scores: Scores) -> State | None:
@@ -255,73 +165,46 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
     """
     margin = task.options.margin
     slower = any(fit.evidence >= margin for fit in scores.fits if fit.candidate.absorbed)
-    if task.options.process_fitted or state.changes or not (slower or suspicious(state.base)):
+    if task.options.process_fitted or state.now.changes:
         return None
-    now = whole(state.bare, task.runs, state.added)
-    found = with_process(state.given, task.runs, state.added, margin)
+    if not (slower or suspicious(state.now.base)):
+        return None
+    found = with_process(task, state, state.now.effects)
     inside = [fit for fit in scores.fits if fit.candidate.inside and fit.evidence > 0.0]
     best = max(inside, key=lambda fit: fit.evidence, default=None)
     gained = 0.0 if best is None else best.evidence
-    if found is None or found.worth >= now.worth(margin) - gained:
-        return None
-    explained = now.worth(margin) - found.worth  # one figure alone is what an effect says
-    rivals = [fit.candidate.effect for fit in inside if fit.evidence > explained - margin]
-    if best is not None and same_thing(found.changed.changes, [best.candidate.effect, *rivals]):
-        return None
-    return behind(state, found)
-
-
-def changed_again(task: Task, state: State) -> State:
-    """Fit the changes of the process again, if there are any, beside what was found since."""
-    found = _fitted_again(task, state, state.added)
-    return state if found is None else behind(state, found)
-
-
-def made_room(task: Task, state: State, new: AddedEffect) -> tuple[State, AddedEffect]:
-    """Return the state without a new effect, and the effect; its process changed beside both."""
-    found = _fitted_again(task, state, (*state.added, new))
     if found is None:
-        return state, new
-    *others, last = found.whole.effects
-    return dataclasses.replace(behind(state, found), added=tuple(others), base=state.base), last
+        return None
+    explained = state.now.worth(margin) - found.worth(margin)
+    if explained <= gained:
+        return None
+    # One figure alone is what an effect says.
+    rivals = [fit.candidate.effect for fit in inside if fit.evidence > explained - margin]
+    if best is not None and same_thing(found.changes, [best.candidate.effect, *rivals]):
+        return None
+    return state.behind(found)
 
 
-def _fitted_again(task: Task, state: State, effects: Sequence[AddedEffect]) -> Mended | None:
-    """Return the explanation by effects behind a process that is changed for them.
+def changed_again(task: Task, state: State, effects: Sequence[AddedEffect]) -> Explanation | None:
+    """Return the explanation by effects behind a process that is changed for them once more.
 
     None where the process was not changed before, or is better as it is.
     """
-    if not state.changes:
+    if not state.now.changes:
         return None
-    margin = task.options.margin
-    now = whole(state.bare, task.runs, effects)
-    found = with_process(state.given, task.runs, effects, margin)
-    better = found is not None and found.worth < now.worth(margin) + _price(task, state, now)
+    margin, found = task.options.margin, with_process(task, state, effects)
+    better = found is not None and found.worth(margin) < state.now.holding(effects).worth(margin)
     return found if better else None
 
 
 def singles(state: State) -> list[AddedEffect]:
     """Return the effects that explain most alone, the process as it is now."""
     look = state.looks[min(state.opened, len(state.looks) - 1)]
-    found = []
-    for fit in sorted(look.scores.fits, key=lambda fit: -fit.evidence):
-        behaviour = fit.behaviour(look.scores.base.run)
-        if behaviour is not None and fit.evidence > 0.0 and large_enough(fit):
-            found.append(AddedEffect(fit, behaviour, fit.candidate.twins))
-    return found
-
-
-def behind(state: State, found: Mended) -> State:
-    """Return the state with a changed process, and what it has of effects refitted behind it."""
-    return dataclasses.replace(
-        state,
-        bare=found.changed.model,
-        changes=found.changed.changes,
-        slopes=found.changed.slopes,
-        added=found.whole.effects,
-        base=found.whole.base,
-        earlier=(),
-    )
+    return [
+        AddedEffect(fit, fit.candidate.twins)
+        for fit in sorted(look.scores.fits, key=lambda fit: -fit.evidence)
+        if fit.candidate.inside and fit.evidence > 0.0 and large_enough(fit)
+    ]
 
 
 def _left_in_doubt(state: State) -> list[str]:
@@ -334,9 +217,3 @@ def _left_in_doubt(state: State) -> list[str]:
     if last.chosen is None:
         return []
     return [last.chosen.candidate.effect, *(effect for _, effect in last.alternatives)]
-
-
-def _price(task: Task, state: State, now: Whole) -> float:
-    """Return what the changes of the process cost an explanation."""
-    rows = max(fit.rows for fit in now.base.noise)
-    return price_of(state.changes, rows, task.options.margin)

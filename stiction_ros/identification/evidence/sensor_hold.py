@@ -27,10 +27,10 @@ a border of rounding slowly, two when noise carries it over the next."""
 def held_rows(pv: FloatArray) -> BoolArray:
     """Return which rows repeat a value because PV was not read, shape (N,).
 
-    A run of repeats is held where it ends in a jump that rounding cannot make, or where one hold a
-    record is likelier than noise that stays within a step of rounding for so long. The step is the
-    least difference of any two values: where values are not rounded it is next to nothing, and all
-    repeats are held, as by a sensor that reports by exception.
+    Where no value comes back, PV is not rounded, and all repeats are held, as by a sensor that
+    reports by exception. Else a run of repeats is held where it ends in a jump that rounding cannot
+    make, or where one hold a record is likelier than noise that stays within a step of rounding for
+    so long. The step is the least difference of any two values.
 
     Args:
         pv: one output, shape (N,).
@@ -39,7 +39,10 @@ def held_rows(pv: FloatArray) -> BoolArray:
     still = moves <= 1e-9 * max(float(np.ptp(pv)), 1e-300)
     if still.all():
         return np.ones(len(pv), dtype=bool)
-    step = float(np.diff(np.unique(pv)).min())
+    values = np.unique(pv)
+    if len(values) > int((~still).sum()):
+        return np.append(False, still)
+    step = float(np.diff(values).min())
     ends = np.append(np.flatnonzero(~still), len(moves))  # moves that end a run of repeats
     held = np.append(moves[ends[:-1]] > ROUNDED * step * (1.0 + 1e-6), False)
     repeats = np.diff(ends, prepend=-1) - 1
@@ -52,14 +55,16 @@ def _stays(pv: FloatArray, step: float) -> float:
     """Return how likely white noise leaves a rounded value as it is, where that is likeliest.
 
     The variance of the noise is what two changes in succession take back of each other (Roll 1984,
-    J. Finance 39, 1127), less that of rounding.
+    J. Finance 39, 1127), less that of rounding. What two that are farther apart have in common is a
+    trend, which hides some of it.
 
     Args:
         pv: shape (N,).
         step: of rounding.
     """
     changes = np.diff(pv)
-    variance = -float(changes[1:] @ changes[:-1]) / len(changes) - step**2 / 12.0
+    trend = max(float(changes[2:] @ changes[:-2]), 0.0)
+    variance = (trend - float(changes[1:] @ changes[:-1])) / len(changes) - step**2 / 12.0
     return math.erf(step / math.sqrt(8.0 * variance)) if variance > 0.0 else 1.0
 
 

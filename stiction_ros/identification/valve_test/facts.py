@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.answer.step_answer import StepAnswer
 from stiction_ros.identification.evidence.sensor_hold import held_rows
@@ -50,9 +51,12 @@ def facts_before(record: Record, found: Identification, limits: Limits) -> Facts
         InputError: several valves or outputs.
     """
     _of_one_loop(record)
-    valve, step = found.valves[0], record.sample_time
-    answer = StepAnswer.of(found.outputs[0], valve.name, len(record), step)
-    facts = facts_of_answer(answer, valve.name, float(record.op[-1, 0]), 0.0)
+    valve, step, model = found.valves[0], record.sample_time, found.outputs[0]
+    answer = StepAnswer.of(model, valve.name, len(record), step)
+    left = record.pv[:, 0] - model.free_run({valve.name: found.stem[:, 0]}, record.pv[:, 0])
+    if not np.isfinite(left).all():  # a level: PV bounds what it does by itself
+        left = record.pv[:, 0]
+    facts = facts_of_answer(answer, left, valve.name, float(record.op[-1, 0]), 0.0)
     pv = float(record.pv[-round(facts.hold / step) :, 0].mean())
     reach = max(2.0 * valve.static_interval[1], WIDENS**2 * SMALLEST)
     room = float(np.abs(record.pv[:, 0] - pv).max()) + reach * abs(facts.gain or 0.0)
@@ -60,7 +64,9 @@ def facts_before(record: Record, found: Identification, limits: Limits) -> Facts
     return limits.of(facts)
 
 
-def facts_of_answer(answer: StepAnswer, valve: str, op: float, pv: float) -> Facts:
+def facts_of_answer(
+    answer: StepAnswer, left: FloatArray, valve: str, op: float, pv: float
+) -> Facts:
     """Return what the answer to a step tells, without limits.
 
     A move is held for the dead time and :data:`LAGS` lags; where PV does not settle until the
@@ -68,6 +74,7 @@ def facts_of_answer(answer: StepAnswer, valve: str, op: float, pv: float) -> Fac
 
     Args:
         answer: of PV to 1 % of stem.
+        left: what it leaves of PV in a record, shape (N,).
         valve: tag.
         op, pv: where the test begins, % and engineering units.
     """
@@ -83,9 +90,27 @@ def facts_of_answer(answer: StepAnswer, valve: str, op: float, pv: float) -> Fac
     gain: float | None = None
     if np.isfinite(answer.values).all() and np.abs(answer.values).max() > 0.0:
         gain = float(answer.values[min(count, known - 1)]) or None
-    noise = answer.noise / math.sqrt(count)
+    noise = noise_over(left, count)
     everywhere = (-math.inf, math.inf)
     return Facts(valve, op, pv, gain, noise, answer.dead_time, count * step, math.inf, everywhere)
+
+
+def noise_over(left: FloatArray, count: int) -> float:
+    """Return the standard deviation of the mean over ``count`` samples, by those side by side.
+
+    Args:
+        left: what a model leaves of PV, shape (N,).
+        count: samples; half of N where that is less.
+
+    Returns:
+        0 for fewer than two samples.
+    """
+    count = min(count, len(left) // 2)
+    if not count:
+        return 0.0
+    sums = np.cumsum(np.append(0.0, left))
+    means = (sums[count:] - sums[:-count]) / count
+    return float(np.sqrt(0.5 * np.mean((means[count:] - means[:-count]) ** 2)))
 
 
 def facts_of_test(record: Record, judgement: Judgement, limits: Limits) -> Facts:

@@ -16,8 +16,9 @@ from stiction_ros.identification.valve_test.steps import FEWEST, SHORTEST, Steps
 
 DECIDED = 0.95
 """Probability from which on a verdict is given, either way."""
-STOPS = 0.99
-"""Probability at which a test that goes on ends: one of a hundred ends wrongly."""
+STOPS = 0.995
+"""Probability at which a test that goes on ends: one of two hundred ends wrongly, as many again may
+where no move is left, and all from :data:`DECIDED` on count."""
 NO_LINK = 0.1
 """Prior of a PV that OP does not move at all: a wrong tag, a bypass. The rest is shared evenly by
 friction and none, as only loops whose record left that open are tested."""

@@ -17,7 +17,7 @@ WIDENS = 2.5
 """Times by which a pair is wider than the one before: five go from the smallest friction of
 interest to the largest."""
 SIZES = 12  # of pairs that a further round is chosen from
-PAIRS, ROUNDS = 3, 3  # pairs of a round, and rounds
+PAIRS = 3  # of a round that is made by hand
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,13 +7,15 @@ from typing import Any
 
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.timer import Timer
 from std_msgs.msg import String
 
@@ -22,15 +24,14 @@ from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared import parameters
 from stiction_ros.nodes.shared.messages import status, to_stamp
 from stiction_ros.nodes.shared.peers import Inlet, Outlet, Patience, Peers, known_as
-from stiction_ros.nodes.shared.typed import Log, log_of, quality
 from stiction_ros.online.health import LEVELS, Noticed
 from stiction_ros.settings import changed
 
-SIGNAL_QOS = quality(100, ReliabilityPolicy.RELIABLE)
+SIGNAL_QOS = QoSProfile(depth=100)
 # What waits for a process that is busy for a moment; writers keep SIGNAL_QOS.
-READER_QOS = quality(5000, ReliabilityPolicy.RELIABLE)
-LATCHED_QOS = quality(1, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
-LATCHED_READER_QOS = quality(100, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
+READER_QOS = QoSProfile(depth=5000)
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED_READER_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ACK_PATIENCE = 3.0  # s for all topics together: a reader that was killed never answers
 LINK_PATIENCE = 5.0  # s until a node says what it waits for
 LINK_REMINDER = 30.0  # s until it says so again
@@ -68,9 +69,10 @@ class ManagedNode(LifecycleNode):
         self.add_on_set_parameters_callback(self._on_set)
 
     @property
-    def log(self) -> Log:
+    def log(self) -> RcutilsLogger:
         """The logger of the node."""
-        return log_of(self)
+        log: RcutilsLogger = self.get_logger()
+        return log
 
     def create_timer(
         self,
@@ -140,7 +142,7 @@ class ManagedNode(LifecycleNode):
     def _configure(self) -> None:
         parameters.refuse_unknown(self)
         self.settings = parameters.read(self, self.settings_class)
-        self._diagnostics = self.outlet(DiagnosticArray, "/diagnostics", quality(100))
+        self._diagnostics = self.outlet(DiagnosticArray, "/diagnostics", QoSProfile(depth=100))
         self._looks, self._told_level = 0, "ok"
         self._beat = self.create_timer(LOOK_PERIOD, self._look_around)
         self.configure()
@@ -208,10 +210,6 @@ class ManagedNode(LifecycleNode):
         subscription = self.create_subscription(kind, topic, take, qos)
         self.inlets[topic] = Inlet(subscription, writers, qos)
 
-    def drain(self, topic: str) -> int:
-        """Hand all that is queued on an inlet to its callback now, and count it."""
-        return self.inlets[topic].drain()
-
     def linked(self) -> None:
         """Called once when everything in ``wait_for`` has matched, in both directions."""
 
@@ -277,21 +275,28 @@ class ManagedNode(LifecycleNode):
 
     # ---- parameters ------------------------------------------------------------------------
 
+    def needed(self, key: str, what: str, kind: str) -> str:
+        """Return a text parameter; InputError, which says of what ``kind`` it is, if empty."""
+        value = str(getattr(self.settings, key))
+        if not value:
+            where = f"{self.get_name()}: {key}"
+            raise InputError(f"no {what}", where=where, fix=f"set it to a {kind}")
+        return value
+
+    def commander(self, space: str = "") -> str:
+        """Return the full name of the node that commands a loop in the namespace ``space``."""
+        name = str(self.settings.commander)
+        if name.startswith("/"):
+            return name
+        parts = (self.get_namespace().strip("/"), space, name)
+        return "/" + "/".join(part for part in parts if part)
+
     def configuration(self) -> dict[str, Any]:
         """Return what ``~/config`` tells besides the parameters."""
         return {}
 
     def retune(self, settings: Any) -> None:
         """React to changed settings; InputError refuses them."""
-
-    def set_parameters_atomically(self, parameter_list: list[Any]) -> Any:
-        """Set parameters as ROS does, but say which one is unknown."""
-        try:
-            for parameter in parameter_list:
-                parameters.check_known(self, parameter.name)
-        except InputError as error:
-            return parameters.refusal(error)
-        return super().set_parameters_atomically(parameter_list)
 
     def _on_set(self, wanted: list[Any]) -> Any:
         values = {p.name: p.value for p in wanted}
@@ -301,9 +306,9 @@ class ManagedNode(LifecycleNode):
             if self._configured and settings is not self.settings:
                 self.retune(settings)
         except InputError as error:
-            return parameters.refusal(error)
+            return SetParametersResult(successful=False, reason=str(error))
         self.settings = settings
-        return parameters.accepted()
+        return SetParametersResult(successful=True)
 
     # ---- diagnostics -----------------------------------------------------------------------
 

@@ -3,7 +3,7 @@
 import importlib
 import itertools
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,6 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.nodes.shared.typed import quality
 from stiction_ros.records.storage.bag_metadata import INFINITE_NS, Qos
 
 if TYPE_CHECKING:  # nodes that control nothing load nothing of control
@@ -56,6 +55,31 @@ def values_of(message: JointState, names: Sequence[str]) -> FloatArray | None:
     if any(name not in found for name in names):
         return None
     return np.array([found[name] for name in names], dtype=float)
+
+
+def measured_of(message: JointState, names: Sequence[str]) -> FloatArray | None:
+    """Return the values of ``names``, NaN for those without one; None when no name is there."""
+    values = values_of(message, names)
+    if values is not None:
+        return values
+    if not set(names).intersection(message.name):
+        return None
+    found = dict(zip(message.name, message.position, strict=False))
+    return np.array([found.get(name, np.nan) for name in names], dtype=float)
+
+
+def friction_message(
+    stamp: int, by: str, rows: Mapping[str, tuple[float, float, float]]
+) -> JointState:
+    """Return value, lower and upper end of every friction; empty for an unusable window.
+
+    The ``stamp`` is the end of the window, ns; ``by`` is ``valid_from`` of the loop model in force.
+    """
+    message = joint_state(stamp, list(rows), [value for value, _, _ in rows.values()])
+    message.velocity = [low for _, low, _ in rows.values()]
+    message.effort = [high for _, _, high in rows.values()]
+    message.header.frame_id = by
+    return message
 
 
 def trajectory(
@@ -153,8 +177,8 @@ def reader_qos(offered: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
     profiles = [info.qos_profile for info in offered]
     reliable = all(p.reliability is ReliabilityPolicy.RELIABLE for p in profiles)
     latched = all(p.durability is DurabilityPolicy.TRANSIENT_LOCAL for p in profiles)
-    return quality(
-        depth,
-        ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )

@@ -1,17 +1,13 @@
-"""Runs one node as a process: parameter files, signals, errors and the exit code."""
+"""Runs one node as a process: signals, errors and the exit code."""
 
 import gc
-import itertools
 import os
-import re
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import rclpy
-import yaml
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.exceptions import (
     InvalidNamespaceException,
@@ -21,18 +17,12 @@ from rclpy.exceptions import (
 )
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
 
 from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared.managed import ManagedNode
-from stiction_ros.nodes.shared.typed import leave
 from stiction_ros.orphans import DIE_WITH_PARENT, die_with_parent
 
-HELP = """usage: {name} [--ros-args [-p NAME:=VALUE ...] [--params-file FILE] [-r FROM:=TO ...]]
-
-{description}
-
-Parameters with their descriptions: ros2 param describe /{name} NAME
-"""
 SWITCH = 0.0005  # s until a thread beside the loop must let go, in realtime
 
 _UNUSABLE = (
@@ -44,74 +34,6 @@ _UNUSABLE = (
     RCLError,
     UnknownROSArgsError,
 )
-KEY = "ros__parameters"
-
-
-def parameter_files(arguments: Sequence[str]) -> list[str]:
-    """Return the files behind ``--params-file``."""
-    return [value for name, value in itertools.pairwise(arguments) if name == "--params-file"]
-
-
-def node_keys(path: str) -> list[str]:
-    """Return the patterns of node names in a parameter file, such as ``/**/plant``.
-
-    Raises:
-        InputError: the file cannot be read, or holds no parameters of a node.
-    """
-    try:
-        document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", where=path) from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        said = " ".join(str(error).split())
-        raise InputError(f"is not YAML ({said})", where=path) from None
-    if not isinstance(document, Mapping):
-        raise InputError(f"has no {KEY}", where=path, fix=f"write NODE: {{{KEY}: {{…}}}}")
-    keys = list(_keys(document, ""))
-    if not keys:
-        raise InputError(f"has no {KEY}", where=path, fix=f"write NODE: {{{KEY}: {{…}}}}")
-    return keys
-
-
-def applies(key: str, node: str) -> bool:
-    """Tell whether the parameters under ``key`` go to ``node``, such as ``/unit1/plant``.
-
-    ``*`` stands for one part of the name, ``**`` for any number of parts; a key without a
-    leading slash begins at the root.
-    """
-    pattern = ""
-    for part in key.strip("/").split("/"):
-        if part == "**":
-            pattern += "(/[^/]+)*"
-        else:
-            pattern += "/" + "[^/]*".join(re.escape(piece) for piece in part.split("*"))
-    return re.fullmatch(pattern, node) is not None
-
-
-def unused(path: str, node: str) -> str:
-    """Return a warning when nothing in the file goes to ``node``, else an empty text.
-
-    Raises:
-        InputError: as :func:`node_keys`.
-    """
-    keys = node_keys(path)
-    if any(applies(key, node) for key in keys):
-        return ""
-    name = node.rpartition("/")[2]
-    return (
-        f"{path} holds nothing for {node}, only for {', '.join(keys)}; "
-        f"name it {node} or /**/{name} there"
-    )
-
-
-def _keys(document: Mapping[Any, Any], above: str) -> Iterator[str]:
-    for name, value in document.items():
-        if not isinstance(value, Mapping):
-            continue
-        key = f"{above}/{str(name).strip('/')}" if above else str(name)
-        if KEY in value:
-            yield key
-        yield from _keys({n: v for n, v in value.items() if n != KEY}, key)
 
 
 class _Interrupted(BaseException):
@@ -134,35 +56,23 @@ class _Signals:
             raise _Interrupted
 
 
-def run(
-    name: str, description: str, make: Callable[[], ManagedNode], args: Sequence[str] | None = None
-) -> int:
+def run(name: str, make: Callable[[], ManagedNode]) -> int:
     """Spin the node that ``make`` builds until it has finished or a signal comes.
 
     Returns:
         0 after a clean end, 1 after a failure while running, 2 for unusable input.
     """
-    arguments = list(sys.argv if args is None else args)
-    if "-h" in arguments[1:] or "--help" in arguments[1:]:
-        print(HELP.format(name=name, description=description), end="")
-        return 0
     node: ManagedNode | None = None
     try:
         signals = _Signals()
         if os.environ.get(DIE_WITH_PARENT):
             die_with_parent(signal.SIGTERM, int(os.environ[DIE_WITH_PARENT]))
         try:
-            for path in parameter_files(arguments):
-                node_keys(path)
-            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+            rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
             node = make()
         except _UNUSABLE as error:
             print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
             return 2
-        for path in parameter_files(arguments):
-            said = unused(path, node.get_fully_qualified_name())
-            if said:
-                node.log.warning(said)
         if _is_realtime(node):
             sys.setswitchinterval(SWITCH)
         executor = SingleThreadedExecutor()
@@ -186,7 +96,9 @@ def run(
             node.finish()
         return 0
     finally:
-        leave(node)
+        if node is not None:
+            node.destroy_node()
+        try_shutdown()
         for number in (signal.SIGINT, signal.SIGTERM):  # Python would die of one while it ends
             signal.signal(number, signal.SIG_IGN)
 

@@ -88,7 +88,7 @@ class LiveController:
 
     def close(self) -> None:
         """End the work in the background."""
-        self._background.close()
+        self._background.shutdown(cancel_futures=True)
 
     @property
     def mode(self) -> ControlMode:
@@ -150,7 +150,7 @@ class LiveController:
 
     def _prepare_ahead(self) -> None:
         """Begin with what is offered before it is due, where that costs no time here."""
-        if self._offered is not None and self._background.ahead:
+        if self._offered is not None and not isinstance(self._background, AtOnce):
             self._offered.judge = self._judge(self._offered.model)
             self._offered.prepare(self._background, self._past)
 

@@ -8,8 +8,6 @@ import numpy as np
 from stiction_ros.identification.valve_test.judgement import Judgement, judged, measured_enough
 from stiction_ros.identification.valve_test.plan import (
     CLEAR,
-    PAIRS,
-    ROUNDS,
     Facts,
     first_round,
     further_round,
@@ -17,6 +15,9 @@ from stiction_ros.identification.valve_test.plan import (
 )
 from stiction_ros.online.handover.hand_over import Background
 
+MOST = 30
+"""Moves of a test: three rounds of five pairs, as many as go from the smallest friction of interest
+to the largest."""
 RESTS = 5  # holds that are waited for at most until PV rests
 
 
@@ -25,7 +26,7 @@ class ValveTest:
 
     OP rests until PV does, makes the moves of the plan, and is judged after each; each further pair
     is chosen by what was answered so far. The test ends when it is decided, friction also known to
-    ``margin``, when three rounds or the limits leave no other move, or when something happens that
+    ``margin``, when :data:`MOST` moves or the limits leave no other, or when something happens that
     it does not allow for. OP then goes back to where it was, unless someone else has it.
 
     Attributes:
@@ -132,7 +133,7 @@ class ValveTest:
                 self._levels and stays(self.facts, self.judgement, self._levels[:2])
             ):
                 plan = None
-                if self._made < 2 * PAIRS * ROUNDS:
+                if self._made < MOST:
                     plan = further_round(self.facts, self.judgement, 1)
                 self._levels = [] if plan is None else list(plan.levels[:-1])
         if not self._levels:

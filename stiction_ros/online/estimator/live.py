@@ -24,7 +24,7 @@ from stiction_ros.online.estimator.friction_change import (
     look_for_change,
     narrowed,
 )
-from stiction_ros.online.estimator.trust import Trust, TrustedFriction, TrustRule, alike
+from stiction_ros.online.estimator.trust import TrustedFriction, TrustRule, ValveTrust, alike
 from stiction_ros.online.plain_settings import FitSchedule
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
@@ -144,7 +144,7 @@ class LiveEstimator:
         self.loop, self.sample_time = loop, sample_time
         self.valves, self.outputs = tuple(valves), tuple(outputs)
         self.published_model: LoopModel | None = None
-        self._trust = Trust(self.valves, settings)
+        self._trust = {name: ValveTrust(settings) for name in self.valves}
         self._op: deque[FloatArray] = deque(maxlen=settings.window)
         self._pv: deque[FloatArray] = deque(maxlen=settings.window)
         self._published: Mapping[str, TrustedFriction] = {}
@@ -159,13 +159,19 @@ class LiveEstimator:
         """Change settings from the next sample on; window and trust are kept, also when refused."""
         settings.options()
         self.settings = settings
-        self._trust.retune(settings)
+        for trust in self._trust.values():
+            trust.rule = settings
         self._op = deque(self._op, maxlen=settings.window)
         self._pv = deque(self._pv, maxlen=settings.window)
 
+    @property
+    def trusted(self) -> dict[str, TrustedFriction]:
+        """The trusted friction of each valve that has one."""
+        return {n: v.trusted for n, v in self._trust.items() if v.trusted is not None}
+
     def options(self) -> IdentificationOptions:
         """Return what the next fit is asked; a law that is trusted is kept."""
-        laws = {friction.law for friction in self._trust.trusted.values()}
+        laws = {friction.law for friction in self.trusted.values()}
         options = self.settings.options()
         if self.settings.law != AUTO or len(laws) != 1:
             return options
@@ -211,20 +217,15 @@ class LiveEstimator:
         """
         record = self._waiting.pop(end, None)
         self._waiting = {k: r for k, r in self._waiting.items() if k > end}
-        before = set(self._trust.trusted)
+        known = self.trusted
         changes = () if record is None else self._look(end, record)
         happened = [c for c in changes if c.status is not ChangeStatus.UNCHANGED]
         if happened:
             self._begin_anew(end, max(happened, key=lambda c: c.samples))
         elif not self._young(end):
-            kept = {n for n, f in self._trust.trusted.items() if not f.settled}
-            kept |= {change.valve for change in changes if change.doubted}
-            kept |= {
-                name for name in self.valves if is_set_point(name)
-            }  # the inner loop's friction
-            self._trust.update(found.valves, kept, {c.valve for c in changes if c.explained})
-        trusted = dict(self._trust.trusted)
-        if record is not None and not before and trusted and self._reference is None:
+            self._judge(found, changes)
+        trusted = self.trusted
+        if record is not None and not known and trusted and self._reference is None:
             self._reference = Reference.of(found, record)
             if self._reference is not None:
                 self._anchor = end + 1, LeadIn.last_of(record.op, found.stem, record.pv)
@@ -237,6 +238,20 @@ class LiveEstimator:
             self._published, self.published_model = trusted, model
         return FitUpdate(end, found, trusted, model, changes)
 
+    def _judge(self, found: Identification, changes: Sequence[FrictionChange]) -> None:
+        """Let the rule of trust judge a window that speaks of no change.
+
+        What is not settled, or doubted, stays as it is, as does the OP of an outer loop, whose
+        valve shows the friction of an inner one. Where the trusted friction explains the window,
+        the window only narrows it.
+        """
+        kept = {name for name, friction in self.trusted.items() if not friction.settled}
+        kept |= {change.valve for change in changes if change.doubted}
+        firm = {change.valve for change in changes if change.explained}
+        for valve in found.valves:
+            if valve.name not in kept and not is_set_point(valve.name):
+                self._trust[valve.name].update(valve, valve.name in firm)
+
     def _young(self, end: int) -> bool:
         """Return whether too few samples follow the last change for a fit to count."""
         first = max((change.first for change in self._changed.values()), default=None)
@@ -244,7 +259,7 @@ class LiveEstimator:
 
     def _look(self, end: int, record: Record) -> tuple[FrictionChange, ...]:
         """Return what the window says of changes; narrow what is not settled."""
-        trusted = self._trust.trusted
+        trusted = self.trusted
         if self._reference is None or not trusted or not self.settings.change_moves:
             return ()
         evidence = self._evidence(self._reference, end, record)
@@ -260,7 +275,7 @@ class LiveEstimator:
                 change = self._changed.get(name)
                 since = change is not None and change.first >= end + 1 - len(record)
                 whole = since and evidence.first > 0
-                self._trust.renew(name, narrowed(evidence, j, friction, whole=whole))
+                self._trust[name].renew(narrowed(evidence, j, friction, whole=whole))
         return tuple(changes)
 
     def _evidence(self, reference: Reference, end: int, record: Record) -> Evidence | None:
@@ -277,7 +292,7 @@ class LiveEstimator:
             return None
         stem, sure = record.op.copy(), 0
         laws: dict[int, Stiction] = {}
-        for name, friction in self._trust.trusted.items():
+        for name, friction in self.trusted.items():
             j = self.valves.index(name)
             u, law = record.op[:, j], laws.setdefault(j, friction.behaviour())
             if before is not None:
@@ -305,7 +320,7 @@ class LiveEstimator:
     def _begin_anew(self, end: int, change: FrictionChange) -> None:
         """Trust what a change has left, and let the window begin with it."""
         first = end + 1 - change.samples
-        self._trust.renew(change.valve, change.friction)
+        self._trust[change.valve].renew(change.friction)
         self._changed[change.valve] = _Change(change.status, first)
         self._anchor = self._seen = None
         if change.before is not None and len(change.before.op):

@@ -1,7 +1,7 @@
 """When an estimate of friction is trusted, and what a later window may change."""
 
 import dataclasses
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Self
 
 from stiction_ros.effects import Stiction
@@ -157,42 +157,6 @@ class ValveTrust:
         elif said is VerdictKind.HEALTHY:
             self.trusted, self._pending = None, None
             self._found_windows = self._disjoint_windows = 0
-
-
-class Trust:
-    """The rule for all valves of a loop."""
-
-    def __init__(self, valves: Sequence[str], rule: TrustRule) -> None:
-        self._valves = {name: ValveTrust(rule) for name in valves}
-
-    def retune(self, rule: TrustRule) -> None:
-        """Judge the next windows by ``rule``; what is trusted stays."""
-        for valve in self._valves.values():
-            valve.rule = rule
-
-    def update(
-        self,
-        estimates: Sequence[ValveEstimate],
-        kept: Container[str] = (),
-        firm: Container[str] = (),
-    ) -> Mapping[str, TrustedFriction]:
-        """Take in one fit and return the trusted friction by valve.
-
-        Valves that are ``kept`` stay as they are, ``firm`` ones may be narrowed.
-        """
-        for estimate in estimates:
-            if estimate.name not in kept:
-                self._valves[estimate.name].update(estimate, estimate.name in firm)
-        return self.trusted
-
-    def renew(self, valve: str, friction: TrustedFriction | None) -> None:
-        """Trust ``friction`` from now on, None for a healthy valve."""
-        self._valves[valve].renew(friction)
-
-    @property
-    def trusted(self) -> Mapping[str, TrustedFriction]:
-        """The trusted friction of each valve that has one."""
-        return {n: v.trusted for n, v in self._valves.items() if v.trusted is not None}
 
 
 def alike(one: Mapping[str, TrustedFriction], other: Mapping[str, TrustedFriction]) -> bool:

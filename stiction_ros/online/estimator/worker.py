@@ -8,11 +8,9 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
-from stiction_ros.identification import Identification, IdentificationOptions
 from stiction_ros.identification.warm_up import compile_loops
-from stiction_ros.online.estimator.live import METHOD, fit
+from stiction_ros.online.estimator.live import METHOD
 from stiction_ros.orphans import die_with_parent
-from stiction_ros.records import Record
 
 T = TypeVar("T")
 
@@ -36,26 +34,16 @@ class FitWorker:
         context = multiprocessing.get_context("spawn")
         others = set(multiprocessing.active_children())
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_settle)
-        self._ready = self._pool.submit(os.getpid)
-        self._processes = set(multiprocessing.active_children()) - others
         # Before the first window is full.
         self._compiled = self._pool.submit(compile_loops, self._methods, helped=True)
-
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-        return self._ready.result()
+        self._processes = set(multiprocessing.active_children()) - others
 
     @property
     def compiled(self) -> bool:
         """Whether the process has all the machine code that a fit needs."""
         return self._compiled.done()
 
-    def submit(self, record: Record, options: IdentificationOptions) -> Future[Identification]:
-        """Queue a fit; the future may hold the InputError of an unusable window."""
-        return self.call(fit, record, options)
-
-    def call(self, work: Callable[..., T], *arguments: Any) -> Future[T]:
+    def submit(self, work: Callable[..., T], *arguments: Any) -> Future[T]:
         """Queue a function of a module behind the fits; the future may hold what it raised."""
         try:
             return self._pool.submit(work, *arguments)

@@ -77,26 +77,24 @@ class Reception(enum.Enum):
     FUTURE = "future"
 
 
-@dataclasses.dataclass(frozen=True)
-class CommandRules:
-    """What a plant or driver asks of an OP."""
-
-    commander: str  # full name of the only node that may command; empty for the first that does
-    step: int  # from one sample to the next, ns
-    exact: bool  # only the OP that bears the stamp of the present sample is taken (lockstep)
-
-
 class OpPort:
-    """Judges OPs by :class:`CommandRules` and counts what became of them.
+    """Judges the OPs that a plant or driver is sent, and counts what became of them.
 
     Attributes:
         commander: full name of the node that commands; empty before the first.
         counts: by :class:`Reception`.
     """
 
-    def __init__(self, rules: CommandRules) -> None:
-        self._rules = rules
-        self.commander = rules.commander
+    def __init__(self, commander: str, step: int, *, exact: bool) -> None:
+        """Begin.
+
+        Args:
+            commander: full name of the only node that may command; empty for the first that does.
+            step: from one sample to the next, ns.
+            exact: whether only the OP that bears the stamp of the present sample is taken.
+        """
+        self._step, self._exact = step, exact
+        self.commander = commander
         self.counts: Counter[Reception] = Counter()
         self._last: int | None = None
 
@@ -109,7 +107,7 @@ class OpPort:
         return found
 
     def _reception(self, sender: str, stamp: int, op: FloatArray | None, present: int) -> Reception:
-        exact, step = self._rules.exact, self._rules.step
+        exact, step = self._exact, self._step
         if not sender or sender != (self.commander or sender):
             return Reception.NAME
         if op is None:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from stiction_ros import discrepancy
-from stiction_ros.effects import behaviours
+from stiction_ros.discrepancy.answer.say import called
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 
@@ -80,12 +80,11 @@ def _sentence(found: discrepancy.Discrepancy, effects: Sequence[str]) -> str:
     if found.process_changes and not found.alternatives:
         said = (f"process to {each.output}: {each.sentence}" for each in found.process_changes)
         return "; ".join(said)
-    return "one of " + ", ".join(_named(place, effect) for place, effect in found.alternatives)
+    return "one of " + ", ".join(called(place, effect) for place, effect in found.alternatives)
 
 
 def _effect(effect: discrepancy.FoundEffect, start: float) -> str:
-    """Return an effect such as ``V1: stiction f_s 4.9 (4.6 to 5.2) %, f_d 2 (1.8 to 2.2) %``."""
-    units = _units(effect)
+    """Return an effect such as ``stiction of valve V1: f_s 4.9 (4.6 to 5.2) %``."""
     parts = []
     for key, value in effect.parameters.items():
         shift = start if key == "time" else 0.0
@@ -93,23 +92,7 @@ def _effect(effect: discrepancy.FoundEffect, start: float) -> str:
         if key in effect.intervals:
             low, high = effect.intervals[key]
             text += f" ({low + shift:.4g} to {high + shift:.4g})"
-        parts.append(f"{text} {units[key]}".rstrip() if key in units else text)
-    said = f"{_named(effect.place, effect.effect)} {', '.join(parts)}".rstrip()
-    others = " or ".join(_named(place, name) for place, name in effect.alternatives)
+        parts.append(f"{text} {effect.units.get(key, '')}".removesuffix(" 1").rstrip())
+    said = ": ".join(filter(None, (called(effect.place, effect.effect), ", ".join(parts))))
+    others = " or ".join(called(place, name) for place, name in effect.alternatives)
     return f"{said}, or {others}" if others else said
-
-
-def _named(place: str, effect: str) -> str:
-    kind, _, tag = place.partition(":")
-    if kind == "valve":
-        return f"{tag}: {effect}"
-    return f"{tag}: {kind} {effect}" if tag else f"{kind} {effect}"
-
-
-def _units(effect: discrepancy.FoundEffect) -> dict[str, str]:
-    """Return the units of the parameters; a signal's own unit is not known here."""
-    found: dict[str, str] = {}
-    for kind in behaviours():
-        if kind.effect == effect.effect:
-            found |= {p.key: "" if "signal" in p.unit else p.unit for p in kind.parameters()}
-    return found

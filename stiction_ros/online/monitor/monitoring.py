@@ -9,20 +9,11 @@ from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator
+from stiction_ros.online.handover.hand_over import AtOnce
 from stiction_ros.online.monitor.gap_finding import GapFinding, find_in_window, standing, unusable
 from stiction_ros.online.monitor.gap_monitor import GapLook, GapMonitor, MonitorRule
 
 Submit = Callable[..., "Future[Any]"]
-
-
-def run_here(work: Callable[..., Any], *arguments: Any) -> Future[Any]:
-    """Run ``work`` now; the future is done, and may hold what it raised."""
-    future: Future[Any] = Future()
-    try:
-        future.set_result(work(*arguments))
-    except Exception as error:  # as a worker process would hand it over
-        future.set_exception(error)
-    return future
 
 
 def check_model(
@@ -78,14 +69,14 @@ class Monitoring:
         rule: MonitorRule,
         live: LiveEstimator,
         given: LoopModel | None = None,
-        submit: Submit = run_here,
+        submit: Submit | None = None,
     ) -> None:
         """Start with the given model, or with none; that of another loop fails each measurement.
 
-        The estimator ``live`` shares samples and fits; ``submit`` runs a function with arguments,
-        here or in another process, in order.
+        The estimator ``live`` shares samples and fits; ``submit`` runs a function with arguments
+        in another process, in order; without it they run here.
         """
-        self._live, self._given, self._submit = live, given, submit
+        self._live, self._given, self._submit = live, given, submit or AtOnce().submit
         self.monitor = GapMonitor(rule, live.loop, live.valves, live.outputs, live.sample_time)
         self._running: deque[tuple[GapLook, Future[GapFinding]]] = deque()
         self._refusal = ""

@@ -2,6 +2,7 @@
 
 import dataclasses
 import enum
+from collections.abc import Iterator
 from typing import Any
 
 from stiction_ros.online.replays.bag import ReplayBag
@@ -71,33 +72,28 @@ class Replay:
     monitor: MonitorMatch | None = None  # None when the estimator ran without monitor
 
     @property
+    def _compared(self) -> Iterator[tuple[Match, str]]:
+        """What came of each comparison, with its difference: fits, ``op``, modes, monitor."""
+        for fit in self.fits:
+            yield fit.match, f"fit at {self.seconds(fit.fit.stamp):.9g} s: {fit.difference}"
+        if self.op is not None and self.op.compared:
+            said = self.op.first_difference
+            yield Match.DIFFERENT if said else Match.EQUAL, said
+        for one in (self.modes, self.monitor):
+            if one is not None:
+                yield one.match, one.difference
+
+    @property
     def match(self) -> Match:
         """``different`` when anything compared differs, ``equal`` when anything is compared."""
-        found = [fit.match for fit in self.fits]
-        if self.modes is not None:
-            found.append(self.modes.match)
-        if self.op is not None and self.op.compared:
-            found.append(Match.DIFFERENT if self.op.first_difference else Match.EQUAL)
-        if self.monitor is not None:
-            found.append(self.monitor.match)
-        for match in (Match.DIFFERENT, Match.EQUAL):
-            if match in found:
-                return match
-        return Match.NOT_COMPARED
+        found = [match for match, _ in self._compared]
+        order = (Match.DIFFERENT, Match.EQUAL)
+        return next((match for match in order if match in found), Match.NOT_COMPARED)
 
     @property
     def first_difference(self) -> str:
         """The first difference: of fits, ``op``, modes, then the monitor; empty for none."""
-        for fit in self.fits:
-            if fit.match is Match.DIFFERENT:
-                return f"fit at {self.seconds(fit.fit.stamp):.9g} s: {fit.difference}"
-        if self.op is not None and self.op.first_difference:
-            return self.op.first_difference
-        if self.modes is not None and self.modes.match is Match.DIFFERENT:
-            return self.modes.difference
-        if self.monitor is not None and self.monitor.match is Match.DIFFERENT:
-            return self.monitor.difference
-        return ""
+        return next((said for match, said in self._compared if match is Match.DIFFERENT), "")
 
     def seconds(self, stamp: int) -> float:
         """Return the time of a stamp in s since the first sample of the run."""

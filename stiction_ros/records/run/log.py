@@ -4,7 +4,7 @@ import dataclasses
 import itertools
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from stiction_ros.effects.behaviour import FloatArray
@@ -70,12 +70,34 @@ class RunLog:
         )
 
 
+@dataclasses.dataclass(frozen=True)
+class _Bag:
+    """What a bag holds, of all its loops."""
+
+    path: str | Path
+    signals: LoopSignals
+    messages: Sequence[tuple[int, BagMessage]]  # the others that tell of a run, with their numbers
+    recorded: Mapping[str, int]  # messages by topic
+    sent: Sequence[int]  # when each was published, ns
+    notes: Sequence[str]  # what was left out
+
+
 def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
     """Read everything that a report needs from a bag, in one pass.
 
     Of several runs the longest is told, with a note on the others. Arguments and errors are those
     of :func:`stiction_ros.records.run.loop_runs.read_bag_parts`.
     """
+    return _log(_read(path), namespace)
+
+
+def read_runs(path: str | Path, namespaces: Iterable[str]) -> dict[str, RunLog]:
+    """Read several loops of a bag in one pass, each as :func:`read_run`, by namespace."""
+    bag = _read(path)
+    return {namespace: _log(bag, namespace) for namespace in namespaces}
+
+
+def _read(path: str | Path) -> _Bag:
     notes: list[str] = []
     recorded: Counter[str] = Counter()
     messages: list[tuple[int, BagMessage]] = []
@@ -96,8 +118,12 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
         else:
             messages.append((number, message))
     notes.extend(decoder.notes)
-    published = events.published_counts([message for _, message in messages])
-    runs = loop_runs(signals, bag_source(path), namespace, notes)
+    return _Bag(path, signals, messages, recorded, sent, notes)
+
+
+def _log(bag: _Bag, namespace: str | None) -> RunLog:
+    messages, signals = bag.messages, bag.signals
+    runs = loop_runs(signals, bag_source(bag.path), namespace, bag.notes)
     run = max(runs, key=len)
     place = runs.index(run)  # what was said between the begin of the run and that of the next one
     begin = run.begin if place else 0
@@ -119,12 +145,12 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
         modes=events.mode_changes(said) or events.mode_texts(said),
         loop_models=events.texts(configured, "loop_model"),
         configs=configs,
-        recorded=dict(recorded),
-        published=published,
+        recorded=dict(bag.recorded),
+        published=events.published_counts([message for _, message in messages]),
         notes=record.notes,
         fits=events.fits(said),
         stem_estimate=events.stem_estimate(said, record, start),
-        wall_seconds=(max(sent) - min(sent)) / 1e9,
+        wall_seconds=(max(bag.sent) - min(bag.sent)) / 1e9,
         gaps=events.gap_log(said),
         pv_to_op_ms=events.answer_times(said),
     )

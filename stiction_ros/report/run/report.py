@@ -9,7 +9,7 @@ from stiction_ros.online.session import Scenario
 from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.events import ModeChange
-from stiction_ros.records.run.log import RunLog, read_run
+from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.page import (
     Cell,
     count,
@@ -74,9 +74,17 @@ def headline(story: Story) -> str:
 
 
 def findings(story: Story) -> list[str]:
-    """Return the findings in a few sentences."""
-    lines = []
-    swap, found = story.log.swap, story.phases
+    """Return what the controller did, and what became of the cycle, in a few sentences."""
+    lines, found = mode_lines(story), story.phases
+    if found.cycle is not None and found.status is PhaseStatus.OK:
+        period = duration(found.cycle.period * story.record.sample_time)
+        lines.append(f"Before, the loop cycled with a period of {period}. {_changes(story)}")
+    return lines
+
+
+def mode_lines(story: Story) -> list[str]:
+    """Return how the mode of the controller changed, in a few sentences."""
+    lines, swap = [], story.log.swap
     if swap is not None:
         known = [
             f"{valve} f_S = {percent(swap.frictions[key])} % and "
@@ -92,9 +100,6 @@ def findings(story: Story) -> list[str]:
         lines += _later_changes(story, swap)
     elif story.log.modes:
         lines.append(f"The controller stayed {story.log.modes[-1].mode} throughout.")
-    if found.cycle is not None and found.status is PhaseStatus.OK:
-        period = duration(found.cycle.period * story.record.sample_time)
-        lines.append(f"Before, the loop cycled with a period of {period}. {_changes(story)}")
     return lines
 
 
@@ -343,27 +348,21 @@ class RunReport:
 
 
 def report_run(
-    bag: str | Path,
+    log: RunLog,
     out: str | Path,
     *,
     scenario: Scenario | None = None,
     seconds: float | None = None,
-    namespace: str | None = None,
+    load: float | None = None,
 ) -> RunReport:
-    """Read a bag of a live loop and write ``summary.json`` and ``report.html``.
+    """Write ``summary.json`` and ``report.html`` of a live loop.
 
     Args:
-        bag: a rosbag2 directory or a ``.mcap`` file.
+        log: of its run.
         out: folder, made when missing; or the ``.html`` file alone.
         scenario: that was run, for the comparison with a loop without friction.
-        seconds: wall time of the run, where known.
-        namespace: of the loop's topics, for a bag that holds several loops.
+        seconds, load: wall time of the run, and of the machine before it, where known.
     """
-    story = tell(read_run(bag, namespace=namespace), scenario=scenario)
-    return write_run(story, out, seconds)
-
-
-def write_run(story: Story, out: str | Path, seconds: float | None = None) -> RunReport:
-    """Write what :func:`report_run` writes of a run that has been scored."""
-    figures = summary(story, seconds)
+    story = tell(log, scenario=scenario)
+    figures = summary(story, seconds, load)
     return RunReport(figures, write_page(out, run_page(story), figures))

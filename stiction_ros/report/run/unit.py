@@ -2,17 +2,16 @@
 
 import dataclasses
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from stiction_ros.online.unit import UnitScenario
 from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT
-from stiction_ros.records.run.log import RunLog, read_run
-from stiction_ros.report.page import Cell, duration, number, table, write_page
+from stiction_ros.records.run.log import RunLog
+from stiction_ros.report.page import Cell, duration, number, table
 from stiction_ros.report.run.figures import whole_run
 from stiction_ros.report.run.identified import KINDS, valve_cards
-from stiction_ros.report.run.report import findings
+from stiction_ros.report.run.report import mode_lines
 from stiction_ros.report.run.scoring import Phase, PhaseStatus, errors, phases
 from stiction_ros.report.run.story import Story, tell
 from stiction_ros.report.run.summary import summary
@@ -34,7 +33,6 @@ class UnitReport:
     stories: Mapping[str, Story]
     swapped: str  # name of the loop whose controller was swapped first; empty where none was
     found: Neighbours  # which valve it is, from what was recorded before that swap
-    page: Path | None = None  # ``report.html``; None before it is written
 
     @property
     def status(self) -> str:
@@ -42,24 +40,6 @@ class UnitReport:
         if not self.swapped:
             return PhaseStatus.NO_SWAP.value
         return self.stories[self.swapped].phases.status.value
-
-
-def report_unit(bag: Path, out: Path, scenario: UnitScenario, seconds: float) -> UnitReport:
-    """Read a bag of several loops and write ``summary.json`` and one ``report.html``.
-
-    Args:
-        bag: a rosbag2 directory.
-        out: folder, made when missing.
-        scenario: that was run.
-        seconds: wall time of the run.
-
-    Raises:
-        InputError: as :func:`stiction_ros.records.run.log.read_run`.
-    """
-    logs = {name: read_run(bag, namespace=name) for name in scenario.members}
-    report = unit_report(logs, scenario)
-    page = write_page(out, unit_page(report), unit_summary(report, seconds))
-    return dataclasses.replace(report, page=page)
 
 
 def unit_report(logs: Mapping[str, RunLog], scenario: UnitScenario) -> UnitReport:
@@ -110,7 +90,7 @@ def unit_page(report: UnitReport) -> str:
     for name, story in report.stories.items():
         parts += [
             f"<h2>{text(name)}</h2>",
-            *[f"<p>{words(line)}</p>" for line in findings(story)],
+            *[f"<p>{words(line)}</p>" for line in mode_lines(story)],
             valve_cards(story.identified.get("valves", []), story)
             if name in report.found.sources
             else "",

@@ -67,11 +67,6 @@ class LocalEngine:
         """How many processes work."""
         return self._jobs
 
-    @property
-    def processes(self) -> tuple[int, ...]:
-        """Ids of the processes that are there."""
-        return tuple(worker.process.pid or 0 for worker in self._workers)
-
     def run(self, tasks: Iterable[Task], options: SurveyOptions) -> Iterator[Done]:
         """Yield what is said of each loop as it comes; refused if no worker gets ready."""
         waiting = iter(tasks)

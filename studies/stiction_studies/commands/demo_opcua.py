@@ -75,7 +75,7 @@ def _plant(directory: Path, seed: int, speed: float) -> "PlantProcess":
 
 def _nodes(directory: Path, plant: "PlantProcess") -> dict[str, dict[str, Any]]:
     """Return the parameters of the four nodes: those of the scenario tank, and the bridge."""
-    nodes = bridged_nodes(find("tank"), directory, speed=plant.options.speed)
+    nodes = bridged_nodes(find("tank"), directory, "opcua", speed=plant.options.speed)
     nodes["opcua"] = plant.node_parameters() | {
         "write": ["tank"],
         "ask": "start",

@@ -47,9 +47,9 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "study",
-        description="Run a scenario's live loop over many seeds by the core, without ROS, and "
-        "print what was identified and what the swap gained. Exit code 1 when a run with "
-        "sticky valves was not swapped, or one with ideal valves was.",
+        description="Run a scenario's live loop over seeds by the core, without ROS, and print "
+        "what was identified and what the swap gained. Exit code 1 when a loop with sticky valves "
+        "was not swapped, one with ideal valves was, or a wrong one of several named or trusted.",
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="a scenario of demo, or a file")
     parser.add_argument(

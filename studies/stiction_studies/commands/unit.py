@@ -39,9 +39,8 @@ def run(scenario: "UnitScenario", options: argparse.Namespace) -> int:
     """Run all seeds and print them; return 1 where another valve was named or trusted."""
     work = functools.partial(run_seed, scenario, ideal_valves=options.ideal_valves)
     outcomes = run_seeds(work, options.seeds, options.jobs, scenario.name)
-    effects = {
-        v.name for v in scenario.simulated.plant.valves if v.effects and not options.ideal_valves
-    }
+    valves = () if options.ideal_valves else scenario.simulated.plant.valves
+    effects = {valve.name for valve in valves if valve.effects}
     at_fault = [loop.name for loop in scenario.loops if effects & set(loop.valves)]
     hand_over(options.json, outcomes, lambda: _print(scenario.name, outcomes))
     right = [
@@ -58,8 +57,8 @@ def _print(name: str, outcomes: list[Outcome]) -> None:
 
     table = Table("seed", "swap", "trusted", *UNIT_COLUMNS, title=name, title_justify="left")
     for one in outcomes:
-        for row in one["rows"]:
-            told = one["seed"], one["swap"][row[0]], one["trusted"][row[0]]
-            table.add_row(*map(str, told), *row)
+        for name, *row in one["rows"]:
+            told = one["seed"], one["swap"][name], one["trusted"][name]
+            table.add_row(*map(str, told), name, *row)
         table.add_section()
     Console(width=150).print(table)

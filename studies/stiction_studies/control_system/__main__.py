@@ -66,7 +66,7 @@ async def _serve(path: Path) -> None:
         top.number("speed", above=0.0),
         top.integer("start"),
         Path(top.text("journal")) if "journal" in top else None,
-        top.flag("history", False),
+        top.raw("history", False),
     )
     seed = top.integer("seed")
     top.finish()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from stiction_ros.opcua.security import Credentials
-from stiction_ros.opcua.session import ANSWER, kind_of, node_ids, open_client
+from stiction_ros.opcua.session import ANSWER, node_ids, open_client
 from stiction_studies.control_system.tags import NAMESPACE
 
 if TYPE_CHECKING:
@@ -50,7 +50,9 @@ class PlantHand:
         if new:
             found = await node_ids(client, list(new.values()))
             nodes = {name: found[tag] for name, tag in new.items()}
-            self._kinds |= {tag: await kind_of(client, node) for tag, node in nodes.items()}
+            for tag, node in nodes.items():
+                kind = await client.get_node(node).read_data_type_as_variant_type()
+                self._kinds[tag] = kind
             self._nodes |= nodes
         for name, value in values.items():
             told = ua.DataValue(ua.Variant(value, self._kinds[name]))

@@ -41,6 +41,7 @@ class ManualTest:
         time: dead time and lag, s; of a level, the time in which its loop would be closed.
         lead: of OP over the stem at the start, %.
         noise: standard deviation of the transmitter's noise, engineering units.
+        colour: time constant of the noise, samples; 0 is white.
         step: of the rounding of PV, same units; 0 is none.
         stale: first sample, and the one behind the last, in which PV shows no news.
         circumstances: names of what is not usual.
@@ -53,6 +54,7 @@ class ManualTest:
     time: float
     lead: float
     noise: float
+    colour: float
     step: float
     stale: tuple[tuple[int, int], ...]
     circumstances: tuple[str, ...]
@@ -148,6 +150,7 @@ def manual_test(seed: int) -> ManualTest:
         time=lag + delay,
         lead=random.uniform(-0.9, 0.9) * valve.static,
         noise=noise,
+        colour=colour,
         step=noise * log_uniform(random, 0.5, 3.0) if coarse else 0.0,
         stale=_stretches(random) if stale else (),
         circumstances=tuple(

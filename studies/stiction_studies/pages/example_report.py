@@ -13,7 +13,7 @@ from stiction_ros.report.page import Cell, card, duration, number, table
 from stiction_ros.report.record_page import evidence_table
 from stiction_ros.report.run.identified import KINDS, process_table, verdict_line
 from stiction_ros.report.run.story import TANK_UNITS
-from stiction_ros.report.shapes import free_run, responses
+from stiction_ros.report.shapes import responses
 from stiction_ros.signals.holds import set_point_moves
 from stiction_ros.texts import finite
 from stiction_studies.examples.comparison import Against, Comparison, ValveComparison
@@ -101,7 +101,7 @@ def trends(example: Example, found: Identification) -> str:
         curves = [
             Curve("PV, measured", "whole", record.pv[part, i]),
             Curve("one-step estimate", "pv", one_step[part]),
-            Curve("free run", "free", free_run(output, stems, record.pv[:, i])[part]),
+            Curve("free run", "free", output.free_run(stems, record.pv[:, i])[part]),
         ]
         if record.sp is not None:
             curves.append(Curve("set-point", "sp", record.sp[part, i], steps=True))

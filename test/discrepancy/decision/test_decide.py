@@ -27,7 +27,7 @@ class Named(Candidate):
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         raise NotImplementedError
 
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour | None:
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour | None:
         raise NotImplementedError
 
 

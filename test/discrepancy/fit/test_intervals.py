@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from gap_loops import loop, record
 
-from stiction_ros.discrepancy.candidate.wave import DisturbanceCandidate
-from stiction_ros.discrepancy.candidate.waves import SineWave, StepWave
+from stiction_ros.discrepancy.candidate.wave import DISTURBANCE, SineCandidate, StepCandidate
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.fit.uncertainty import (
@@ -37,13 +36,13 @@ def base_beside(added: FloatArray, unscored: FloatArray | None = None) -> Baseli
 def sine(phase: float) -> tuple[Baseline, CandidateFit]:
     time = np.arange(900.0)
     base = base_beside(0.3 * np.sin(2.0 * math.pi * time / PERIOD + phase))
-    wave = SineWave.of(base.run, np.array([1.0 / PERIOD]))
-    return base, fit_candidate(base, base.run.gap, DisturbanceCandidate.on(base.run, 0, wave))
+    wave = SineCandidate.of(base.run, DISTURBANCE, 0, np.array([1.0 / PERIOD]))
+    return base, fit_candidate(base, base.run.gap, wave)
 
 
 def step(unscored: FloatArray | None = None) -> tuple[Baseline, CandidateFit]:
     base = base_beside(np.where(np.arange(900) >= 400, 0.3, 0.0), unscored)
-    candidate = DisturbanceCandidate.on(base.run, 0, StepWave.of(base.run, np.array([400.0])))
+    candidate = StepCandidate.of(base.run, DISTURBANCE, 0, np.array([400.0]))
     return base, fit_candidate(base, base.run.gap, candidate)
 
 

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from stiction_ros.discrepancy.decision.extend import AddedEffect
+from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.steps.settle import band_of, without_outliers
 from stiction_ros.effects import Backlash, Behaviour, HeStiction, StepDisturbance
 
@@ -16,9 +16,9 @@ def added(place: str, behaviour: Behaviour, point: list[float], *factors: float)
         place=place, effect=behaviour.effect, key=(place, behaviour.effect), dated=bool(factors)
     )
     fit = types.SimpleNamespace(
-        candidate=candidate, point=np.array(point), factors=np.array(factors)
+        candidate=candidate, behaviour=behaviour, point=np.array(point), factors=np.array(factors)
     )
-    return AddedEffect(cast(Any, fit), behaviour, ())
+    return AddedEffect(cast(Any, fit))
 
 
 def step(time: float, size: float) -> AddedEffect:

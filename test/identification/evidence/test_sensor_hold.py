@@ -36,6 +36,24 @@ def test_a_rounded_value_that_noise_would_have_changed_was_not_read(
     assert held_rows(values)[61 : 60 + length].all()
 
 
+def test_a_ramp_elsewhere_does_not_hide_it() -> None:
+    found = 0
+    for seed in range(40):
+        values = np.random.default_rng(seed).normal(0.0, 0.8, 200)
+        values[150:] += 1.5 * np.arange(50)
+        values = np.round(values)
+        values[60:100] = values[60]
+        found += bool(held_rows(values)[61:100].all())
+    assert found >= 36
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40))
+def test_all_repeats_of_a_pv_that_is_not_rounded_are_held(seed: int, length: int) -> None:
+    values = np.cumsum(np.random.default_rng(seed).normal(0.0, 1e-3, 100)) + np.arange(100)
+    values[-length:] = values[-length]
+    assert held_rows(values).sum() == length - 1
+
+
 @given(st.integers(0, 2**32 - 1), st.floats(0.5, 1.0))
 def test_a_sensor_that_reports_by_exception_holds_until_it_reports(seed: int, width: float) -> None:
     walk = np.cumsum(np.random.default_rng(seed).uniform(-0.4, 0.4, 300))

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from manual_tests import answer, path
 
+from stiction_ros.identification.valve_test.facts import noise_over
 from stiction_ros.identification.valve_test.forecast import Forecast
 from stiction_ros.identification.valve_test.frictions import SMALLEST
 from stiction_ros.identification.valve_test.judgement import Judgement, judged
@@ -40,6 +41,18 @@ def test_the_first_round_widens_from_the_smallest_friction_of_interest() -> None
 def test_a_noisy_pv_takes_larger_pairs() -> None:
     plan = first_round(dataclasses.replace(FACTS, noise=1.0))
     assert ways(plan)[0] == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.9])
+def test_the_noise_of_a_hold_is_that_of_its_mean_however_it_is_coloured(kept: float) -> None:
+    noise = np.random.default_rng(1).standard_normal(100_000)
+    for row in range(1, len(noise)):
+        noise[row] = kept * noise[row - 1] + np.sqrt(1.0 - kept**2) * noise[row]
+    holds = noise[: len(noise) // 24 * 24].reshape(-1, 2, 12).mean(axis=2)
+    drift = np.linspace(0.0, 30.0, len(noise))
+    told = np.diff(holds, axis=1).std() / np.sqrt(2.0)
+    assert noise_over(noise + drift, 12) == pytest.approx(told, rel=0.05)
+    assert noise_over(np.zeros(1), 12) == 0.0
 
 
 @given(st.floats(-2.0, 2.0), st.floats(0.0, 1.0), st.floats(0.1, 30.0), st.floats(0.1, 50.0))

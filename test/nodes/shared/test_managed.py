@@ -303,6 +303,6 @@ def test_everything_that_is_queued_is_taken_at_once(graph: Graph) -> None:
         writer.publish(joint_state(second * 10**9, ["PV1"], [1.0]))
     count = 0
     while count < 5:
-        count += node.drain("pv")
+        count += node.inlets["pv"].drain()
     assert [m.header.stamp.sec for m in node.taken] == [0, 1, 2, 3, 4]
-    assert node.drain("pv") == 0
+    assert node.inlets["pv"].drain() == 0

@@ -9,12 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from stiction_ros.errors import InputError
-
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 
 from stiction_ros.cli.shared.node_processes import ros_environment
-from stiction_ros.nodes.shared.runner import applies, node_keys, parameter_files, unused
 
 PATIENCE = 60.0
 LAST = "stiction_ros.online.input.port_health"  # what the controller imports last
@@ -84,15 +81,6 @@ def test_unusable_input_is_said_without_a_traceback(arguments: list[str], tmp_pa
     assert len(own) == 1
 
 
-def test_a_file_whose_keys_do_not_fit_is_warned_of(tmp_path: Path) -> None:
-    path = tmp_path / "mine.yaml"
-    path.write_text("plant: {ros__parameters: {model: example1.loop.yaml}}")
-    process = start("plant", "-r", "__ns:=/unit1", "--params-file", str(path))
-    _, said = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 2  # no model: nothing in the file was for this node
-    assert said.count(f"{path} holds nothing for /unit1/plant, only for plant") == 1
-
-
 @pytest.mark.parametrize(
     "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.trial)]
 )
@@ -145,59 +133,3 @@ def test_a_node_says_that_it_is_ready() -> None:
         os.kill(process.pid, signal.SIGTERM)
         process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
-
-
-@pytest.mark.parametrize(
-    ("key", "node", "expected"),
-    [
-        ("plant", "/plant", True),
-        ("/plant", "/plant", True),
-        ("plant", "/unit1/plant", False),
-        ("/unit1/plant", "/unit1/plant", True),
-        ("unit1/plant", "/unit1/plant", True),
-        ("/unit1/plant", "/plant", False),
-        ("/**", "/unit1/plant", True),
-        ("/**", "/plant", True),
-        ("/**/plant", "/plant", True),
-        ("/**/plant", "/a/b/plant", True),
-        ("/**/plant", "/a/b/plants", False),
-        ("/*/plant", "/unit1/plant", True),
-        ("/*/plant", "/plant", False),
-        ("/*/plant", "/a/b/plant", False),
-        ("/unit*/plant", "/unit7/plant", True),
-        ("p.ant", "/plant", False),
-    ],
-)
-def test_which_keys_go_to_which_node(key: str, node: str, expected: bool) -> None:
-    assert applies(key, node) is expected
-
-
-def test_nested_keys_are_one_name(tmp_path: Path) -> None:
-    path = tmp_path / "p.yaml"
-    path.write_text("unit1:\n  plant: {ros__parameters: {seed: 1}}\nctl: {ros__parameters: {}}\n")
-    assert node_keys(str(path)) == ["unit1/plant", "ctl"]
-
-
-def test_a_file_for_others_is_named_with_its_keys(tmp_path: Path) -> None:
-    path = tmp_path / "p.yaml"
-    path.write_text("plant: {ros__parameters: {seed: 1}}\n")
-    said = unused(str(path), "/unit1/plant")
-    assert all(part in said for part in (str(path), "/unit1/plant", "only for plant", "/**/plant"))
-    assert unused(str(path), "/plant") == ""
-
-
-@pytest.mark.parametrize(
-    "text", [None, "plant: [", "- 1", "", "plant: 3", "\x00", "plant: {parameters: {seed: 1}}"]
-)
-def test_a_file_that_is_none_is_one_line(tmp_path: Path, text: str | None) -> None:
-    path = tmp_path / "p.yaml"
-    if text is not None:
-        path.write_text(text)
-    with pytest.raises(InputError, match=r"p\.yaml") as found:
-        node_keys(str(path))
-    assert "\n" not in str(found.value)
-
-
-def test_files_are_found_on_the_command_line() -> None:
-    line = ["plant", "--ros-args", "--params-file", "a", "-p", "seed:=1", "--params-file", "b"]
-    assert parameter_files(line) == ["a", "b"]

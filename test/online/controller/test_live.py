@@ -1,7 +1,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Executor, Future
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from stiction_ros.effects import (
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints, ValveChange
 from stiction_ros.online.controller.live import LiveController
-from stiction_ros.online.controller.making import thinned_plan
+from stiction_ros.online.controller.plans import thinned_plan
 from stiction_ros.online.controller.settings import LiveControllerSettings
 
 PLANT = LoopModel.load(find_config("example1.loop.yaml"))
@@ -523,10 +523,8 @@ def test_samples_that_are_passed_over_are_seen_and_keep_op() -> None:
 # ---- beside the loop ---------------------------------------------------------------------------
 
 
-class Later:
+class Later(Executor):
     """A background whose work is done when the test says so."""
-
-    ahead = True
 
     def __init__(self) -> None:
         self.work: list[tuple[Future[Any], Callable[[], Any]]] = []
@@ -540,9 +538,6 @@ class Later:
         for future, work in self.work:
             future.set_result(work())
         self.work.clear()
-
-    def close(self) -> None:
-        return
 
 
 def test_an_offer_that_is_not_ready_in_time_is_taken_when_it_is() -> None:

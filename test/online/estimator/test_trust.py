@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from stiction_ros.effects import HeStiction, KanoStiction, SemiPhysicalStiction
 from stiction_ros.identification import ValveEstimate, VerdictKind
-from stiction_ros.online.estimator.trust import Trust, TrustedFriction, TrustRule, ValveTrust, alike
+from stiction_ros.online.estimator.trust import TrustedFriction, TrustRule, ValveTrust, alike
 
 STICKY, HEALTHY, UNDECIDED = VerdictKind.STICKY, VerdictKind.HEALTHY, VerdictKind.UNDECIDED
 BACKLASH = VerdictKind.BACKLASH
@@ -182,42 +182,28 @@ def test_without_a_sticky_window_nothing_is_ever_trusted(seen: list[ValveEstimat
     assert trust_after(*seen) is None
 
 
-def test_valves_are_judged_apart() -> None:
-    trust = Trust(["V1", "V2"], EXACT)
-    for _ in range(2):
-        trust.update([window(STICKY, name="V1"), window(HEALTHY, name="V2")])
-    assert list(trust.trusted) == ["V1"]
-
-
 def test_a_firm_trust_is_narrowed_but_never_replaced() -> None:
-    trust = Trust(["V1"], EXACT)
+    trust = ValveTrust(EXACT)
     for _ in range(2):
-        trust.update([window(STICKY)])
+        trust.update(window(STICKY))
     for _ in range(4):
-        trust.update([window(HEALTHY, (0.0, 0.2), (0.0, 0.2))], firm={"V1"})
-        trust.update([window(STICKY, (8.0, 9.0))], firm={"V1"})
-    assert trust.trusted["V1"].static_interval == (4.5, 5.5)
-    trust.update([window(STICKY, (4.9, 5.1))], firm={"V1"})
-    assert trust.trusted["V1"].static_interval == (4.9, 5.1)
-
-
-def test_a_valve_that_is_kept_stays_as_it_is() -> None:
-    trust = Trust(["V1"], EXACT)
-    for _ in range(2):
-        trust.update([window(STICKY)])
-    trust.update([window(STICKY, (4.9, 5.1))], kept={"V1"})
-    assert trust.trusted["V1"].static_interval == (4.5, 5.5)
+        trust.update(window(HEALTHY, (0.0, 0.2), (0.0, 0.2)), firm=True)
+        trust.update(window(STICKY, (8.0, 9.0)), firm=True)
+    assert trust.trusted is not None
+    assert trust.trusted.static_interval == (4.5, 5.5)
+    trust.update(window(STICKY, (4.9, 5.1)), firm=True)
+    assert trust.trusted.static_interval == (4.9, 5.1)
 
 
 @pytest.mark.parametrize("new", [None, TrustedFriction(7.0, (6.9, 9.0), 2.0, (1.9, 2.1))])
 def test_what_a_change_has_left_is_trusted_at_once(new: TrustedFriction | None) -> None:
-    trust = Trust(["V1"], EXACT)
+    trust = ValveTrust(EXACT)
     for _ in range(2):
-        trust.update([window(STICKY)])
-    trust.renew("V1", new)
-    assert trust.trusted.get("V1") == new
-    trust.update([window(STICKY)])  # one window does not bring the old one back
-    assert trust.trusted.get("V1") == new
+        trust.update(window(STICKY))
+    trust.renew(new)
+    assert trust.trusted == new
+    trust.update(window(STICKY))  # one window does not bring the old one back
+    assert trust.trusted == new
 
 
 def test_a_friction_that_is_not_settled_is_offered_just_above_what_failed() -> None:

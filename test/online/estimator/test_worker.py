@@ -9,6 +9,7 @@ import pytest
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions
 from stiction_ros.online.estimator import worker as worker_module
+from stiction_ros.online.estimator.live import fit
 from stiction_ros.online.estimator.worker import POLITE, FitWorker, stand_back
 from stiction_ros.records import Record
 
@@ -20,13 +21,13 @@ def test_a_process_that_died_is_replaced_for_the_next_fit() -> None:
     short = Record("short", 1.0, ("V1",), ("PV1",), np.eye(5)[:, :1], np.eye(5)[:, :1])
     worker = FitWorker()
     try:
-        first = worker.pid
-        os.kill(first, signal.SIGKILL)
+        (first,) = worker._processes
+        first.kill()
         with pytest.raises((BrokenProcessPool, InputError)):  # it may be noticed at once
-            worker.submit(short, IdentificationOptions()).result(300.0)
+            worker.submit(fit, short, IdentificationOptions()).result(300.0)
         with pytest.raises(InputError, match="too few"):
-            worker.submit(short, IdentificationOptions()).result(300.0)
-        assert worker.pid != first
+            worker.submit(fit, short, IdentificationOptions()).result(300.0)
+        assert first not in worker._processes
     finally:
         worker.close()
 
@@ -51,7 +52,9 @@ def test_a_process_that_still_compiles_is_not_waited_for() -> None:
 def test_a_fit_stands_back_behind_the_loop() -> None:
     worker = FitWorker()
     try:
-        assert os.getpriority(os.PRIO_PROCESS, worker.pid) > os.getpriority(os.PRIO_PROCESS, 0)
+        assert os.getpriority(os.PRIO_PROCESS, worker.submit(os.getpid).result()) > os.getpriority(
+            os.PRIO_PROCESS, 0
+        )
     finally:
         worker.close()
 

@@ -1,4 +1,5 @@
 import functools
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.handover.hand_over import AtOnce, Beside, HandOver, Past
+from stiction_ros.online.handover.hand_over import AtOnce, HandOver, Past
 
 PROCESS = LoopModel.load(find_config("example1_process.loop.yaml"))
 DESIGN = ControlSettings(hand_over_samples=60).design(PROCESS)
@@ -57,11 +58,11 @@ def test_what_cannot_be_built_says_so_when_it_is_taken() -> None:
 
 
 def test_a_thread_does_the_same_as_the_call() -> None:
-    background = Beside()
+    background = ThreadPoolExecutor(1)
     changes = [HandOver(0, "test", PROCESS, AWARE) for _ in range(2)]
     for change, where in zip(changes, (AtOnce(), background), strict=True):
         change.prepare(where, past_of(150))
-    background.close()
+    background.shutdown()
     one, other = (change.take(past_of(150)).controller for change in changes)
     assert one is not None
     assert other is not None
@@ -108,3 +109,8 @@ def test_a_history_is_a_copy() -> None:
     past.add(np.zeros(1), np.zeros(1), np.zeros(0))
     past.history().op[:] = 7.0
     assert past.history().op.tolist() == [[0.0]]
+
+
+def test_what_is_done_at_once_hands_over_what_it_raised() -> None:
+    with pytest.raises(ZeroDivisionError):
+        AtOnce().submit(lambda: 1 // 0).result()

@@ -5,14 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.online.input.op_port import (
-    KEPT,
-    SILENT,
-    AppliedOp,
-    CommandRules,
-    OpPort,
-    Reception,
-)
+from stiction_ros.online.input.op_port import KEPT, SILENT, AppliedOp, OpPort, Reception
 
 SECOND = 10**9
 ME, OTHER = "/controller", "/stranger"
@@ -22,7 +15,7 @@ A, B = np.array([40.0]), np.array([60.0])
 
 
 def port(commander: str = ME, *, exact: bool = False) -> OpPort:
-    return OpPort(CommandRules(commander, SECOND, exact))
+    return OpPort(commander, SECOND, exact=exact)
 
 
 @pytest.mark.parametrize(

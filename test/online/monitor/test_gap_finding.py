@@ -40,14 +40,14 @@ def test_times_are_those_of_the_run_in_words_and_of_the_window_in_the_document(
 
 def test_a_shift_is_left_open_between_sensor_and_load(shift: GapFinding) -> None:
     assert shift.verdict is GapVerdict.AMBIGUOUS
-    assert "PV1: sensor bias_step" in shift.text
-    assert "PV1: disturbance step" in shift.text
+    assert "bias step of the sensor of PV1" in shift.text
+    assert "step of a disturbance on PV1" in shift.text
     assert " or " in shift.text
 
 
 def test_friction_is_named_with_value_interval_and_unit(friction: GapFinding) -> None:
     assert friction.verdict is GapVerdict.NAMED
-    assert friction.text.startswith("V1: stiction f_s ")
+    assert friction.text.startswith("stiction of valve V1: f_s ")
     assert " to " in friction.text
     assert ") %" in friction.text
 

@@ -24,12 +24,7 @@ from stiction_ros.identification import (
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.live import EstimatorSettings, FitUpdate, LiveEstimator
 from stiction_ros.online.monitor.gap_monitor import MonitorRule
-from stiction_ros.online.monitor.monitoring import (
-    Monitoring,
-    check_model,
-    run_here,
-    with_friction_of,
-)
+from stiction_ros.online.monitor.monitoring import Monitoring, check_model, with_friction_of
 
 SETTINGS = EstimatorSettings(fit_first=20, fit_every=10, fit_latency=5, confirmations=1)
 SHIFTED = record(shifted(), 1200)
@@ -176,11 +171,6 @@ def test_turned_on_again_it_has_found_nothing_yet() -> None:
     monitoring.retune(MonitorRule())
     monitoring.retune(RULE)
     assert (monitoring.look, monitoring.finding) == (None, None)
-
-
-def test_what_is_run_here_hands_over_what_it_raised() -> None:
-    with pytest.raises(ZeroDivisionError):
-        run_here(lambda: 1 // 0).result()
 
 
 def test_a_model_of_another_loop_is_refused() -> None:

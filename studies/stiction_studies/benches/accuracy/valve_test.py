@@ -13,12 +13,13 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.identification.valve_test.facts import LAGS
+from stiction_ros.identification.valve_test.facts import LAGS, noise_over
 from stiction_ros.identification.valve_test.plan import Facts
 from stiction_ros.identification.valve_test.steps import SHORTEST
 from stiction_ros.online.controller.valve_test import ValveTest
 from stiction_ros.online.handover.hand_over import AtOnce
-from stiction_studies.field.manual_test import ManualTest, manual_test
+from stiction_studies.field.loads import coloured
+from stiction_studies.field.manual_test import MOST, ManualTest, manual_test
 from stiction_studies.field.truth import ValveKind
 from stiction_studies.seeds import run_seeds
 
@@ -91,12 +92,13 @@ def facts_of(case: ManualTest) -> Facts:
     samples = max(round(wanted / step), SHORTEST + 1)
     each = case.answer.gain * (1.0 if case.settles else samples * step)
     middle = case.loop.rest
+    before = case.noise * coloured(random, MOST, case.colour)
     return Facts(
         valve="V1",
         op=case.op,
         pv=middle,
         gain=each * off[2],
-        noise=case.noise / np.sqrt(samples),
+        noise=noise_over(before, samples),
         dead=case.answer.dead_time * off[1],
         hold=samples * step,
         op_limit=REACH,
@@ -105,7 +107,7 @@ def facts_of(case: ManualTest) -> Facts:
 
 
 def judge(seed: int) -> Ended:
-    """Test the valve of a seed as a running loop does, three rounds at most.
+    """Test the valve of a seed as a running loop does.
 
     PV counts until the dead time after the last move is over: what is under way comes.
     """

@@ -8,11 +8,11 @@ import time
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import joint_state
-from stiction_ros.nodes.shared.typed import leave
 
 WARM_UP = 200
 BUDGET = 60.0  # s until the two must have met
@@ -81,7 +81,7 @@ def main() -> int:
             return mirror()
         return measure(sys.argv[2].split(","), int(sys.argv[3]))
     finally:
-        leave(None)
+        try_shutdown()
 
 
 if __name__ == "__main__":

@@ -91,7 +91,7 @@ def _write_bare(path: Path, messages: Sequence[RawMessage], compression: str) ->
         for _ in range(ROUNDS):
             for topic, log_time, publish_time, data in messages:
                 writer.add_message(channels[topic.name], log_time, data, publish_time)
-        writer.finish()  # type: ignore[no-untyped-call]
+        writer.finish()
 
 
 def _nodes(directory: Path) -> Row:

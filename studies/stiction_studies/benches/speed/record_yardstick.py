@@ -3,16 +3,17 @@
 import signal
 import sys
 import time
+from collections.abc import Callable
 
 import rclpy
 from mcap.writer import Writer
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 
 from stiction_ros.nodes.shared.managed import READER_QOS, SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import joint_state
-from stiction_ros.nodes.shared.typed import RawTake, leave, subscribe_raw
 from stiction_ros.records.bag.message_definitions import definition
 
 TOPICS = ("/bench/pv", "/bench/op", "/bench/stem")
@@ -57,16 +58,16 @@ def record(path: str) -> int:
         schema = writer.register_schema(KIND, "ros2msg", definition(KIND)[0].encode())
         for topic in TOPICS:
             take = _writing(writer, writer.register_channel(topic, "cdr", schema))
-            subscribe_raw(node, JointState, topic, take, READER_QOS)
+            node.create_subscription(JointState, topic, take, READER_QOS, raw=True)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         while not stop:
             executor.spin_once(timeout_sec=0.1)
-        writer.finish()  # type: ignore[no-untyped-call]
+        writer.finish()
     return 0
 
 
-def _writing(writer: Writer, channel: int) -> RawTake:
+def _writing(writer: Writer, channel: int) -> Callable[..., None]:
     def write(data: bytes, info: dict[str, int]) -> None:
         received, sent = int(info["received_timestamp"]), int(info["source_timestamp"])
         writer.add_message(channel, received, data, sent)
@@ -82,7 +83,7 @@ def main(arguments: list[str]) -> int:
             return talk(float(arguments[1]), int(arguments[2]))
         return record(arguments[1])
     finally:
-        leave(None)
+        try_shutdown()
 
 
 if __name__ == "__main__":

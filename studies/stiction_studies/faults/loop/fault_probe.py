@@ -14,22 +14,20 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from stiction_ros.nodes.shared.typed import end_node, parameter_message, quality
+from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS
 from stiction_studies.faults.loop.rules import Rule, as_it_is
 from stiction_studies.faults.observation import Known, Sampled, Shown
 
 SECOND = 1_000_000_000
-DEEP_QOS = quality(5000, ReliabilityPolicy.RELIABLE)
-SIGNAL_QOS = quality(100, ReliabilityPolicy.RELIABLE)
-LATCHED_QOS = quality(1, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
 HEARD = ("pv", "op", "op_applied")
 LEVELS = {b"\x00": "ok", b"\x01": "warn", b"\x02": "error", b"\x03": "error"}
 ANSWER = 10.0  # s for a service to answer
@@ -70,7 +68,7 @@ class Probe:
         self._nodes: list[Node] = [self.node]
         for topic in topics:
             self.hear(topic)
-        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_status, DEEP_QOS)
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_status, READER_QOS)
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
         self._gone: deque[Callable[[], object]] = deque()
@@ -84,7 +82,7 @@ class Probe:
         self._thread.join(5.0)
         for node in self._nodes:
             self._executor.remove_node(node)
-            end_node(node)
+            node.destroy_node()
         self._executor.shutdown()
         self.context.try_shutdown()
 
@@ -104,7 +102,7 @@ class Probe:
     def hear(self, topic: str) -> None:
         """Hear one more topic of signals from now on."""
         self.heard[topic] = []
-        self.node.create_subscription(JointState, topic, self._hearing(topic), DEEP_QOS)
+        self.node.create_subscription(JointState, topic, self._hearing(topic), READER_QOS)
 
     def _hearing(self, topic: str) -> Callable[[Any], None]:
         taken = self.heard[topic]
@@ -211,14 +209,14 @@ class Probe:
 
     def relay(self, topic: str) -> None:
         """Hand ``TOPIC_direct`` on as ``TOPIC``; :meth:`rule` says what becomes of it."""
-        publisher = self.node.create_publisher(JointState, topic, DEEP_QOS)
+        publisher = self.node.create_publisher(JointState, topic, READER_QOS)
         self._rules[topic] = as_it_is
 
         def hand_on(message: Any) -> None:
             for one in self._rules[topic](message):
                 publisher.publish(one)
 
-        self.node.create_subscription(JointState, f"{topic}_direct", hand_on, DEEP_QOS)
+        self.node.create_subscription(JointState, f"{topic}_direct", hand_on, READER_QOS)
 
     def rule(self, topic: str, rule: Rule | None = None) -> None:
         """Let ``rule`` turn each message of a relay into those that are handed on."""
@@ -229,7 +227,8 @@ class Probe:
     def set_parameters(self, node: str, values: Mapping[str, Any]) -> list[bool]:
         """Set parameters of ``node``; return which were taken, empty when it did not answer."""
         request = SetParameters.Request()
-        request.parameters = [parameter_message(name, value) for name, value in values.items()]
+        wanted = (Parameter(name, value=value) for name, value in values.items())
+        request.parameters = [one.to_parameter_msg() for one in wanted]
         answer = self._call(SetParameters, f"{node}/set_parameters", request)
         return [] if answer is None else [bool(one.successful) for one in answer.results]
 

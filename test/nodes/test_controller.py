@@ -39,7 +39,6 @@ class Clock:
         self.now = 1000.0
         fake = type("Time", (), {"monotonic": lambda: self.now})
         monkeypatch.setattr(controller_module, "time", fake)
-        monkeypatch.setattr("stiction_ros.nodes.controller_inputs.time", fake)
 
 
 class Bench:
