@@ -1,12 +1,10 @@
 """Step 6: one word for all looks, the experiment that would say more, and what stems say alone."""
 
 import dataclasses
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.deferred import halton_sequence
 from stiction_ros.discrepancy.answer.found_effects import FoundEffect
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.base import figures_of
@@ -20,9 +18,6 @@ from stiction_ros.effects import Behaviour, FloatArray, about
 LEFT = 0.4  # of the last effect's score: what may stay unexplained beside a name
 LATEST = 20  # samples that a stem may come late
 TELLS = 0.5  # of the squared distance from OP that an effect has to explain to be told
-SIDES = (-1.0, -0.5, 0.0, 0.5, 1.0)
-STEM_SEARCH_ROUNDS, SHRINK = 9, 0.5
-BOXES, THROWN = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003), 1000  # of a needle, and points in each
 ACCURATE = 0.01  # of the span of OP: a stem that near follows it
 
 
@@ -221,27 +216,16 @@ def _look(run: FreeRun, valve: int) -> StemLook:
 
 def _nearest(candidate: ValveCandidate, run: FreeRun, stem: FloatArray) -> tuple[FloatArray, float]:
     """Return the figures whose stem is nearest, shape (axes,), and its squared distance."""
-    steps = np.array([axis.spacing for axis in candidate.axes])
-    around = np.array(list(itertools.product(SIDES, repeat=len(steps))))
-    tried, size = candidate.grid(), 1.0
-    for _ in range(STEM_SEARCH_ROUNDS):
-        points = candidate.values(tried)
-        left = _left(stem, candidate.stems(run, points))
-        k = int(np.argmin(left))
-        size *= SHRINK
-        tried = tried[k] + size * steps * around
-    point, least = points[k], float(left[k])
-    if not candidate.needle:
-        return point, least
-    halton = halton_sequence(len(steps), seed=0)
-    for size in BOXES:
-        cube = 2.0 * halton.random(THROWN) - 1.0
-        points = candidate.scattered(point, cube, size, any_start=True)
-        left = _left(stem, candidate.stems(run, points))
-        k = int(np.argmin(left))
-        if left[k] < least:
-            point, least = points[k], float(left[k])
-    return point, least
+    from scipy.optimize import differential_evolution
+
+    def left(coordinates: FloatArray) -> FloatArray:
+        return _left(stem, candidate.stems(run, candidate.values(coordinates.T)))
+
+    ranges = [(axis.inner(axis.low), axis.inner(axis.high)) for axis in candidate.axes]
+    found = differential_evolution(
+        left, ranges, seed=0, vectorized=True, updating="deferred", polish=False
+    )
+    return candidate.values(found.x[None, :])[0], float(found.fun)
 
 
 def _left(stem: FloatArray, tried: FloatArray) -> FloatArray:

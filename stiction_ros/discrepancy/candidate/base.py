@@ -2,7 +2,7 @@
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -248,6 +248,11 @@ class Candidate(ABC):
 def figures_of(behaviour: Behaviour) -> dict[str, float]:
     """Return the parameters of an effect by key, in engineering units."""
     return {p.key: float(getattr(behaviour, p.attribute)) for p in behaviour.parameters()}
+
+
+def spans_of(figures: Sequence[Mapping[str, float]]) -> dict[str, tuple[float, float]]:
+    """Return between which values each of several sets of parameters lies."""
+    return {key: (min(f[key] for f in figures), max(f[key] for f in figures)) for key in figures[0]}
 
 
 LEAST_LAG = 2.5  # times the shortest lag that is searched, a fifth of a sample

@@ -8,7 +8,8 @@ from typing import Any, Self
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
-from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, left_by, projector
+from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
+from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
 from stiction_ros.discrepancy.simulation.free_run import SMALL, FreeRun
 from stiction_ros.effects import (
     Axis,

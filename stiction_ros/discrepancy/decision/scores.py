@@ -12,7 +12,7 @@ from stiction_ros.discrepancy.candidate.valve import valve_candidates
 from stiction_ros.discrepancy.candidate.wave import disturbance_candidates
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
-from stiction_ros.discrepancy.likelihood.noise import left_by
+from stiction_ros.discrepancy.likelihood.least_squares import left_by
 from stiction_ros.discrepancy.simulation.free_run import seen_of
 from stiction_ros.effects import ExtraDelay, FloatArray, Offset, ProcessGain, TimeShift
 from stiction_ros.signals.autoregression import whiten

@@ -8,14 +8,13 @@ from typing import Any, cast
 import numpy as np
 
 from stiction_ros.discrepancy.likelihood.declared_noise import seen_noise
+from stiction_ros.discrepancy.likelihood.least_squares import projector, whitened_columns
 from stiction_ros.discrepancy.likelihood.noise import (
     Blocks,
     NoiseFit,
     best_noise,
     given_noise,
     noise_forms,
-    projector,
-    whitened_columns,
 )
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray

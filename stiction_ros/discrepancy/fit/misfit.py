@@ -7,10 +7,9 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
-from stiction_ros.discrepancy.likelihood.kernels import whitened_block
-from stiction_ros.discrepancy.likelihood.noise import left_by
+from stiction_ros.discrepancy.likelihood.least_squares import left_by, whitened_block
 from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
-from stiction_ros.signals.autoregression import TINY, inner_product, whiten
+from stiction_ros.signals.autoregression import TINY, whiten
 
 if TYPE_CHECKING:
     from stiction_ros.discrepancy.fit.baseline import Baseline
@@ -55,56 +54,28 @@ def left_of_shifts(
     return squares
 
 
-@compiled
-def _solved(gram: FloatArray, cross: FloatArray) -> FloatArray:
-    """Return the solution of positive definite equations; both arguments are used up."""
-    count = len(cross)
-    for i in range(count):
-        for j in range(i):
-            share = gram[i, j] / gram[j, j]
-            cross[i] -= share * cross[j]
-            for k in range(j, count):
-                gram[i, k] -= share * gram[j, k]
-    for i in range(count - 1, -1, -1):
-        for j in range(i + 1, count):
-            cross[i] -= gram[i, j] * cross[j]
-        cross[i] /= gram[i, i]
-    return cross
-
-
-@compiled
 def taken_by_sizes(
     target: FloatArray, sizes: FloatArray, rows: BoolArray, basis: FloatArray, ar: FloatArray
 ) -> FloatArray:
     """Return the squares that least squares of the factors takes away, shape (G,).
 
     Args:
-        target, ar: as for :func:`left_of_shifts`; the shared columns are not in ``target``.
+        target, basis, ar: as for :func:`left_of_shifts`; the shared columns are not in ``target``.
         sizes: columns of the factors, shape (N, G, s).
         rows: which of the N are those of ``target``, shape (N,).
-        basis: as for :func:`left_of_shifts`, but of shape (r, n).
     """
-    points, count, rank = sizes.shape[1], sizes.shape[2], len(basis)
-    taken, inside = np.empty(points), np.empty((count, rank))
-    gram, cross = np.empty((count, count)), np.empty(count)
-    for g in range(points):
-        white = whitened_block(sizes[:, g].T.copy(), ar, rows, 0.0)
-        for s in range(count):
-            for c in range(rank):
-                inside[s, c] = inner_product(white[s], basis[c])
-        ridge = TINY
-        for s in range(count):
-            cross[s] = inner_product(white[s], target)
-            for t in range(s + 1):
-                whole = inner_product(white[s], white[t])
-                left = whole - inner_product(inside[s], inside[t])
-                gram[s, t] = gram[t, s] = left
-            ridge += _RIDGE * left + _ROUNDING * whole
-        for s in range(count):
-            gram[s, s] += ridge
-        wanted = cross.copy()
-        taken[g] = inner_product(_solved(gram, wanted), cross)
-    return taken
+    points, factors = sizes.shape[1:]
+    columns = np.ascontiguousarray(sizes.reshape(len(sizes), -1).T)
+    white = whitened_block(columns, ar, rows, 0.0).reshape(points, factors, -1)
+    inside, cross = white @ basis, white @ target
+    whole = white @ white.transpose(0, 2, 1)
+    gram = whole - inside @ inside.transpose(0, 2, 1)
+    ridge = _RIDGE * np.trace(gram, axis1=1, axis2=2) + _ROUNDING * np.trace(
+        whole, axis1=1, axis2=2
+    )
+    gram += (ridge + TINY)[:, None, None] * np.eye(sizes.shape[2])
+    factors = np.linalg.solve(gram, cross[:, :, None])[:, :, 0]
+    return np.asarray(np.sum(factors * cross, axis=1))
 
 
 def misfit(
@@ -125,8 +96,7 @@ def misfit(
             squares = left_of_shifts(target, np.ascontiguousarray(shift), rows, basis, ar[i])
         else:
             assert sizes is not None
-            columns, across = np.ascontiguousarray(sizes), np.ascontiguousarray(basis.T)
-            squares = target @ target - taken_by_sizes(target, columns, marked, across, ar[i])
+            squares = target @ target - taken_by_sizes(target, sizes, marked, basis, ar[i])
         total = total + len(rows) * np.log(np.maximum(squares, TINY))
     if response.possible is not None:
         total = np.where(response.possible, total, np.inf)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from stiction_ros.deferred import halton_sequence
-from stiction_ros.discrepancy.candidate.base import Candidate, figures_of
+from stiction_ros.discrepancy.candidate.base import Candidate, figures_of, spans_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import PROBE, misfit, settled
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
@@ -120,7 +120,7 @@ def likelihood_intervals(
         sides = math.sqrt(SMOOTH - excess) * _factor_sides(base, fit, point)
         found += [(point, factors + side) for side in sides]
     found += [(point, fit.factors) for point in _linear_ends(base, fit)]
-    return _ends(fit.candidate, found)
+    return spans_of(_figures(fit.candidate, found))
 
 
 def otherwise(base: Baseline, fit: CandidateFit) -> list[FloatArray]:
@@ -173,7 +173,7 @@ def bootstrap_intervals(
         found.append((again.point, again.factors))
         if progress is not None:
             progress((b + 1) / resamples)
-    values = [_parameters(fit.candidate, *each) for each in found]
+    values = _figures(fit.candidate, found)
     sure = likelihood_intervals(base, fit, beside)
     ends: Intervals = {}
     for key in values[0]:
@@ -241,15 +241,12 @@ def _factors_at(base: Baseline, fit: CandidateFit, point: FloatArray) -> FloatAr
     return shared_factors(own, base.columns, again, base.blocks)
 
 
-def _parameters(candidate: Candidate, point: FloatArray, factors: FloatArray) -> dict[str, float]:
-    behaviour = candidate.behaviour(point, factors)
-    assert behaviour is not None
-    return figures_of(behaviour)
-
-
-def _ends(candidate: Candidate, found: list[tuple[FloatArray, FloatArray]]) -> Intervals:
-    values = [_parameters(candidate, *each) for each in found]
-    return {key: (min(v[key] for v in values), max(v[key] for v in values)) for key in values[0]}
+def _figures(
+    candidate: Candidate, found: Sequence[tuple[FloatArray, FloatArray]]
+) -> list[dict[str, float]]:
+    """Return the parameters of searched figures and factors."""
+    behaviours = [candidate.behaviour(*each) for each in found]
+    return [figures_of(each) for each in behaviours if each is not None]
 
 
 def _rebuilt(

@@ -1,25 +1,31 @@
 """Noise beyond the declared one, told as an effect: what wanders, how far, and where it enters."""
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
+from stiction_ros.discrepancy.candidate.base import figures_of, spans_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_laws import (
+    FLOOR,
+    Block,
     Law,
-    best_figures,
     declared_block,
     laws_of,
-    score_of,
-    shown_of,
     white_block,
 )
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
-from stiction_ros.discrepancy.likelihood.noise import ENLARGED
+from stiction_ros.discrepancy.likelihood.noise import ENLARGED, SURPRISE
+from stiction_ros.discrepancy.likelihood.state_noise import innovations, left_by_columns
 from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
+from stiction_ros.signals.autoregression import TINY
 
+CLOSE, SAME, TURNS = 1e-2, 0.05, 60  # of the search: figures, their likelihood, turns
 SIDES = (-1.0, 1.0)
 REJECTED = 8.0  # −2 log likelihood, above that of the best figures
 SHORTEST_WAY = 1e-3
@@ -38,7 +44,6 @@ class NoiseEffect:
     intervals: dict[str, tuple[float, float]]  # 95 % of each figure
     # −2 log likelihood of fitted and held-out rows, and the price of its figures as of an effect
     score: float
-    innovation_std: float  # of what it leaves, units of the output
 
 
 def noise_effects(
@@ -60,7 +65,8 @@ def noise_effects(
         near it.
     """
     found = _at_their_best(base, output, declared)
-    enough = _without(base, output, declared) - least * int(base.blocks[output].train.sum())
+    without = _Judge(base, output, declared).score(white_block(0.0))
+    enough = without.fitted + without.held - least * int(base.blocks[output].train.sum())
     better = [each for each in found if each.score < enough]
     lasts = float(base.run.runs.time.max())
     near = sorted(_without_walks(better, lasts), key=lambda each: each.score)
@@ -71,8 +77,8 @@ def _at_their_best(base: Baseline, output: int, declared: DeclaredNoise) -> list
     """Return the laws that have figures, kept."""
     name = ("noise effects", output, declared.std, declared.ar.tobytes())
     if name not in base.known:
-        laws = laws_of(base, output, declared)
-        fitted = [_fitted(base, output, declared, law) for law in laws]
+        judge = _Judge(base, output, declared)
+        fitted = [judge.fitted(law) for law in laws_of(base, output, declared)]
         base.known[name] = [each for each in fitted if each is not None]
     found: list[NoiseEffect] = base.known[name]
     return found
@@ -93,55 +99,92 @@ def _without_walks(laws: list[NoiseEffect], lasts: float) -> list[NoiseEffect]:
     ]
 
 
-def _without(base: Baseline, output: int, declared: DeclaredNoise) -> float:
-    """Return the score of the declared noise alone, rounded values included."""
-    none = Law("", [], (np.zeros(0), np.zeros(0)), lambda _: white_block(0.0), _nothing)
-    own, shown = declared_block(base, output, declared), shown_of(base, output)
-    whole, held, *_ = score_of(np.zeros(0), none, own, shown, base.blocks[output])
-    return whole + held
-
-
-def _nothing(x: FloatArray) -> Behaviour:
-    raise NotImplementedError("the declared noise is no effect")
-
-
 def named_laws(found: Sequence[NoiseEffect], margin: float) -> tuple[NoiseEffect, ...]:
     """Return the best law and those that the record does not tell from it."""
     return tuple(each for each in found if each.score < found[0].score + margin)
 
 
-def _fitted(base: Baseline, output: int, declared: DeclaredNoise, law: Law) -> NoiseEffect | None:
-    own, shown = declared_block(base, output, declared), shown_of(base, output)
-    blocks = base.blocks[output]
+class _Score(NamedTuple):
+    """How likely a law is with given figures."""
 
-    def loss(x: FloatArray) -> float:
-        return score_of(x, law, own, shown, blocks)[0]
+    fitted: float  # fitted, held: −2 log likelihood of fitted and of held-out rows
+    held: float
+    louder: float  # σ over that of the figures
 
-    found, best = best_figures(law, own, shown, blocks)
-    low, high = law.range
-    if not math.isfinite(best) or np.any(found < low + CLEAR) or np.any(found > high - CLEAR):
-        return None  # a figure on the bound of its range is no name
-    whole, held, std, louder = score_of(found, law, own, shown, blocks)
-    rows = max(int(blocks.train.sum()), 2)
-    price = len(found) * math.log(rows) + ENLARGED
-    first = np.eye(len(found))[0]  # is a size: σ is its unit
-    behaviours = [law.behaviour(found + math.log(louder) * first)]
-    ends = _ends(loss, found, law.range)
-    if not np.isfinite(ends).all():
-        return None  # an interval that holds nothing out is no name
-    for k, end in enumerate(ends):
-        scale = math.log(score_of(end, law, own, shown, blocks)[3])
-        scale += SIDES[k % 2] * NORMAL / math.sqrt(2.0 * rows)
-        behaviours.append(law.behaviour(end + scale * first))
-    keys = [(p.key, p.attribute) for p in behaviours[0].parameters()]
-    intervals = {
-        key: (
-            min(float(getattr(b, attribute)) for b in behaviours),
-            max(float(getattr(b, attribute)) for b in behaviours),
+
+class _Judge:
+    """The likelihood of laws beside the declared noise of one output.
+
+    The ratio of the law to the declared noise is what counts: σ is left open as everywhere.
+    """
+
+    def __init__(self, base: Baseline, output: int, declared: DeclaredNoise) -> None:
+        runs = base.run.runs
+        self.own, self.blocks = declared_block(base, output, declared), base.blocks[output]
+        values = np.column_stack([base.run.gap[:, output], base.columns[output]])
+        self.values, self.seen = np.ascontiguousarray(values.T), runs.usable[output]
+        self.begins = np.zeros(len(runs), dtype=bool)
+        self.begins[[rows.start for rows in runs.slices]] = True
+
+    def score(self, block: Block) -> _Score:
+        """Return how likely the states of a law are beside those of the declared noise."""
+        own, blocks = self.own, self.blocks
+        unit = max(own.r, float(np.trace(own.q)), TINY)
+        white, variances = innovations(
+            block_diag(own.a, block.a),
+            block_diag(own.q, block.q) / unit,
+            np.concatenate([own.c, block.c]),
+            max(own.r, FLOOR * unit) / unit,
+            block_diag(own.start, block.start) / unit,
+            self.values,
+            self.seen,
+            self.begins,
         )
-        for key, attribute in keys
-    }
-    return NoiseEffect(law.place, behaviours[0], intervals, whole + held + price, std)
+        if not np.isfinite(white).all():
+            return _Score(math.inf, 0.0, 1.0)
+        left, logs = left_by_columns(white, self.values, blocks.train), np.log(variances)
+        inside, outside = left[blocks.train], left[blocks.held]
+        variance = max(float(inside @ inside) / len(inside), TINY)
+        log = math.log(2.0 * math.pi * variance)
+        outside = np.minimum(outside**2 / variance, SURPRISE**2)
+        fitted = len(inside) * (log + 1.0) + float(logs[blocks.train].sum())
+        held = len(outside) * log + float(logs[blocks.held].sum()) + float(outside.sum())
+        return _Score(fitted, held, math.sqrt(variance / unit))
+
+    def loss(self, law: Law, x: FloatArray) -> float:
+        """Return −2 log likelihood of the fitted rows; inf beyond the range of the figures."""
+        low, high = law.range
+        if np.any(x < low) or np.any(x > high):
+            return math.inf
+        return self.score(law.block(x)).fitted
+
+    def fitted(self, law: Law) -> NoiseEffect | None:
+        """Return a law with its figures; None where one of them holds nothing out."""
+        from scipy.optimize import minimize
+
+        loss = functools.partial(self.loss, law)
+        options = {"xatol": CLOSE, "fatol": SAME, "maxiter": TURNS}
+        tried = [minimize(loss, x, method="Nelder-Mead", options=options) for x in law.starts]
+        best = min(tried, key=lambda each: float(each.fun))
+        found, (low, high) = np.asarray(best.x), law.range
+        bound = np.any(found < low + CLEAR) or np.any(found > high - CLEAR)
+        if not math.isfinite(best.fun) or bound:
+            return None  # a figure on the bound of its range is no name
+        score = self.score(law.block(found))
+        rows = max(int(self.blocks.train.sum()), 2)
+        price = len(found) * math.log(rows) + ENLARGED
+        first = np.eye(len(found))[0]  # is a size: σ is its unit
+        behaviour = law.behaviour(found + math.log(score.louder) * first)
+        ends = _ends(loss, found, law.range)
+        if not np.isfinite(ends).all():
+            return None  # an interval that holds nothing out is no name
+        figures = [figures_of(behaviour)]
+        for k, end in enumerate(ends):
+            scale = math.log(self.score(law.block(end)).louder)
+            scale += SIDES[k % 2] * NORMAL / math.sqrt(2.0 * rows)
+            figures.append(figures_of(law.behaviour(end + scale * first)))
+        whole = score.fitted + score.held + price
+        return NoiseEffect(law.place, behaviour, spans_of(figures), whole)
 
 
 def _ends(

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.noise import left_by, projector
+from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.signals.holds import set_point_moves
 from stiction_ros.texts import spoken

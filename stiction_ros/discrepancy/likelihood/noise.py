@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.discrepancy.likelihood.kernels import (
-    NOTHING,
-    least_squares,
-    orthonormal,
-    sums_of_squares,
-    turn,
+from stiction_ros.discrepancy.likelihood.least_squares import (
+    VANISHED,
+    coefficients,
+    left_by,
+    projector,
     whitened_block,
+    whitened_columns,
 )
 from stiction_ros.discrepancy.likelihood.slow_noise import FIGURES, slow_beside_white
 from stiction_ros.effects import FloatArray
@@ -31,7 +31,6 @@ NOISE_FIT_ROUNDS = 4
 SURPRISE = 5.0  # standard deviations that one held-out row may count
 ENLARGED = 10.0  # BIC: noise beyond the declared one is an effect, and has to beat it as one
 SETTLED = 1e-3  # BIC
-VANISHED = 1e-9  # of a column, that whitening leaves of what it takes away
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,9 +108,7 @@ def fit_noise(
     ar = np.zeros(0) if start is None else start
     best: tuple[float, FloatArray, FloatArray] | None = None
     for _ in range(NOISE_FIT_ROUNDS):
-        sure, beta = turn(rows, target, train, ar)
-        if not sure:
-            beta = _solve(whiten(columns, ar)[train], whiten(target, ar)[train])
+        beta = coefficients(whitened_block(rows, ar, train, 0.0), whitened_rows(target, ar, train))
         residual = target - columns @ beta
         fitted, score = best_autoregression(residual, train, MAX_ORDER)
         if best is not None and score >= best[0] - SETTLED:
@@ -174,33 +171,25 @@ def given_noise(
     """Fit the linear columns under noise whose φ are given, its spread left open."""
     train, target = blocks.train, np.ascontiguousarray(target)
     white = whitened_block(np.ascontiguousarray(columns.T), ar, train, VANISHED)
-    wanted = whitened_rows(target, ar, train)
-    sure, beta = least_squares(white, wanted)
-    if not sure:
-        beta = _solve(white.T, wanted)
+    beta = coefficients(white, whitened_rows(target, ar, train))
     residual = target - columns @ beta
     unseen = ~white.any(axis=1)
     if unseen.any():  # the innovations do not show them, the free run does
-        beta[unseen] = _solve(columns[train][:, unseen], residual[train])
+        seen = np.ascontiguousarray(columns[train][:, unseen].T)
+        beta[unseen] = coefficients(seen, residual[train])
         residual = target - columns @ beta
     return _result(residual, beta, ar, blocks)
-
-
-def whitened_columns(columns: FloatArray, ar: FloatArray, rows: BoolArray) -> FloatArray:
-    """Return columns whitened, shape (n, q), zero where nothing but rounding is left of them.
-
-    Noise of an equation that has settled hides how its run began.
-    """
-    block = whitened_block(np.ascontiguousarray(columns.T), ar, rows, VANISHED)
-    return np.asarray(block.T)
 
 
 def _result(
     residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks, count: int = 0
 ) -> NoiseFit:
     """Return what a fit left; ``count`` figures of its noise are its own and cost something."""
-    rows, inside, held, outside = sums_of_squares(residual, ar, blocks.train, blocks.held, SURPRISE)
-    variance = max(inside / max(rows, 1), TINY)
+    inside = whitened_rows(residual, ar, blocks.train)
+    outside = whitened_rows(residual, ar, blocks.held)
+    rows, total = len(inside), float(inside @ inside)
+    variance = max(total / max(rows, 1), TINY)
+    kept_back = np.minimum(outside**2, SURPRISE**2 * total / max(rows, 1))
     log = math.log(2.0 * math.pi * variance)
     return NoiseFit(
         ar,
@@ -209,27 +198,9 @@ def _result(
         residual,
         rows * (log + 1.0),
         rows,
-        held * log + outside / variance,
+        len(outside) * log + float(kept_back.sum()) / variance,
         count * math.log(max(rows, 2)),
     )
-
-
-def projector(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the columns, shape (n, r), numerical dependence left out."""
-    return np.ascontiguousarray(orthonormal(columns.T.copy()).T)
-
-
-def left_by(basis: FloatArray, values: FloatArray) -> FloatArray:
-    """Return what an orthonormal basis, shape (n, r), leaves of values, shape (n, …)."""
-    return np.asarray(values - basis @ (basis.T @ values))
-
-
-def _solve(columns: FloatArray, target: FloatArray) -> FloatArray:
-    if not columns.shape[1]:
-        return np.zeros(0)
-    scale = np.linalg.norm(columns, axis=0)
-    scale = np.where(scale > NOTHING, scale, np.inf)
-    return np.asarray(np.linalg.lstsq(columns / scale, target, rcond=1e-10)[0] / scale)
 
 
 def information(
@@ -270,9 +241,7 @@ def shared_factors(
     return np.asarray(np.linalg.pinv(total) @ wanted)
 
 
-STEPS = 24  # of the golden section
 SMALLEST = 0.02  # σ over the quantum
-_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _ROOT = math.sqrt(2.0)
 _LEAST = 1e-12
 
@@ -292,27 +261,21 @@ def grouped(fit: NoiseFit, quantum: float, blocks: Blocks) -> NoiseFit:
         quantum: q, > 0, units of the output.
         blocks: rows that are fitted and kept back.
     """
+    from scipy.optimize import minimize_scalar
+
     white = fit.innovations
-    inside = np.ascontiguousarray(white[blocks.train])
+    inside, held = (np.ascontiguousarray(white[rows]) for rows in (blocks.train, blocks.held))
     low = math.log(SMALLEST * quantum)
     high = math.log(max(3.0 * float(np.std(inside)), 2.0 * SMALLEST * quantum))
-    a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_a, at_b = (_minus_two_log(inside, quantum, math.exp(x), np.inf) for x in (a, b))
-    for _ in range(STEPS):
-        if at_a < at_b:
-            high, b, at_b = b, a, at_a
-            a = high - _GOLDEN * (high - low)
-            at_a = _minus_two_log(inside, quantum, math.exp(a), np.inf)
-        else:
-            low, a, at_a = a, b, at_b
-            b = low + _GOLDEN * (high - low)
-            at_b = _minus_two_log(inside, quantum, math.exp(b), np.inf)
-    spread = math.exp(0.5 * (low + high))
-    held = np.ascontiguousarray(white[blocks.held])
+    best = minimize_scalar(
+        lambda x: _minus_two_log(inside, quantum, math.exp(x), np.inf),
+        bounds=(low, high),
+        method="bounded",
+    )
     return dataclasses.replace(
         fit,
-        minus_two_log=min(at_a, at_b),
-        held_minus_two_log=_minus_two_log(held, quantum, spread, SURPRISE),
+        minus_two_log=float(best.fun),
+        held_minus_two_log=_minus_two_log(held, quantum, math.exp(best.x), SURPRISE),
     )
 
 

@@ -1,13 +1,12 @@
 """Noise by its states: what one-step predictions of a state-space model miss, compiled."""
 
 import numpy as np
+from scipy.linalg import solve_discrete_are
 
 from stiction_ros.compiled import compiled
-from stiction_ros.discrepancy.likelihood.kernels import DEPENDENT
+from stiction_ros.discrepancy.likelihood.least_squares import VANISHED, coefficients
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
-from stiction_ros.signals.autoregression import TINY
 
-DOUBLINGS = 30
 STEADY = 1e-13  # of a gain and of a variance: what changes less from row to row stays
 
 
@@ -16,7 +15,7 @@ def steady_gain(
 ) -> tuple[FloatArray, float] | None:
     """Return Kalman's gain, shape (n,), and the variance of what its predictions miss.
 
-    By doubling; None where there is no steady one.
+    None where there is no steady one.
 
     Args:
         a, q: of the states, shape (n, n).
@@ -25,22 +24,10 @@ def steady_gain(
     """
     if not len(a):
         return np.zeros(0), r
-    identity = np.eye(len(a))
-    forward, seen, p = a.T.copy(), np.outer(c, c) / r, q.copy()
-    for _ in range(DOUBLINGS):
-        try:
-            inner = np.linalg.solve(identity + seen @ p, forward)
-        except np.linalg.LinAlgError:
-            return None
-        grown = p + forward.T @ p @ inner
-        seen = seen + forward @ np.linalg.solve(identity + seen @ p, seen) @ forward.T
-        forward = forward @ inner
-        change = float(np.abs(grown - p).max())
-        p = 0.5 * (grown + grown.T)
-        if not np.isfinite(p).all():
-            return None
-        if change <= 1e-10 * float(np.abs(p).max()):
-            break
+    try:
+        p = solve_discrete_are(a.T, c[:, None], q, np.array([[r]]))
+    except ValueError:  # LinAlgError is one
+        return None
     missed = float(c @ p @ c) + r
     return np.asarray(a @ p @ c / missed), missed
 
@@ -124,54 +111,14 @@ def innovations(
     return missed, variance
 
 
-@compiled
-def left_by_columns(
-    white: FloatArray, values: FloatArray, rows: BoolArray, vanished: float
-) -> FloatArray:
+def left_by_columns(white: FloatArray, values: FloatArray, rows: BoolArray) -> FloatArray:
     """Return what least squares on the marked rows leave of the first one, shape (N,).
 
     Args:
         white: a target and its columns, whitened, shape (1 + q, N).
-        values: the same before, of which a column has to keep the share ``vanished`` to count.
+        values: the same before; a column of which whitening leaves nothing does not count.
         rows: shape (N,).
-        vanished: of a column's length.
     """
-    count = white.shape[1]
-    basis, used = np.empty((len(white) - 1, count)), 0
-    left: FloatArray = white[0].copy()
-    for g in range(1, len(white)):
-        after, before = _length(white[g], rows), _length(values[g], rows)
-        if not after > vanished * max(before, TINY):
-            continue
-        column = white[g] / after
-        for _ in range(2):  # twice is enough
-            for other in range(used):
-                share = 0.0
-                for k in range(count):
-                    if rows[k]:
-                        share += basis[other, k] * column[k]
-                for k in range(count):
-                    column[k] -= share * basis[other, k]
-        length = _length(column, rows)
-        if not length > DEPENDENT:
-            continue
-        share = 0.0
-        for k in range(count):
-            column[k] /= length
-            if rows[k]:
-                share += column[k] * left[k]
-        for k in range(count):
-            left[k] -= share * column[k]
-            basis[used, k] = column[k]
-        used += 1
-    return left
-
-
-@compiled
-def _length(values: FloatArray, rows: BoolArray) -> float:
-    """Return the length of values on the marked rows."""
-    total = 0.0
-    for k in range(len(values)):
-        if rows[k]:
-            total += values[k] * values[k]
-    return float(np.sqrt(total))
+    after, before = (np.linalg.norm(each[1:, rows], axis=1) for each in (white, values))
+    columns = white[1:][after > VANISHED * before]
+    return np.asarray(white[0] - coefficients(columns[:, rows], white[0, rows]) @ columns)

@@ -15,7 +15,7 @@ from stiction_ros.discrepancy.decision.explanation import (
 )
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap_options import MARGIN
-from stiction_ros.discrepancy.likelihood.noise import left_by
+from stiction_ros.discrepancy.likelihood.least_squares import left_by
 from stiction_ros.discrepancy.process.free_equation import Equation
 from stiction_ros.discrepancy.process.refit import equations_of, process_with, with_equations
 from stiction_ros.discrepancy.process.slower import GAIN, Changeable

@@ -8,7 +8,8 @@ import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import measure_gap
-from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise, left_by, projector
+from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
+from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel
