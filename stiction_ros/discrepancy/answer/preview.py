@@ -1,12 +1,13 @@
 """The experiment that would decide, simulated: what each of the rivals would show."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
+from stiction_ros.discrepancy.answer.found_effects import FoundEffect
 from stiction_ros.discrepancy.answer.results import Discrepancy
-from stiction_ros.effects import Behaviour, FloatArray, from_mapping
+from stiction_ros.effects import Behaviour, FloatArray, about, from_mapping
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, simulate_open_loop
 
@@ -16,20 +17,6 @@ BANDS = 2.0  # times the friction that it is moved
 MOST = 5  # rivals that are shown
 
 Name = tuple[str, str]
-Figures = Mapping[str, float]
-
-# Figures of a rival that no record tells apart, from those of the effect that stands for it.
-_SAME: dict[tuple[str, str], Callable[[Figures], Figures]] = {
-    ("lag", "pole"): lambda own: {"tau": own["tau"]},
-    ("pole", "lag"): lambda own: {"tau": own["tau"]},
-    ("lag", "lag"): lambda own: {"tau": own["tau"]},
-    ("step", "bias_step"): lambda own: dict(own),
-    ("step", "offset"): lambda own: {"size": own["size"]},
-    ("drift", "drift"): lambda own: dict(own),
-    ("sine", "sine"): lambda own: dict(own),
-    ("stiction", "backlash"): lambda own: {"band": own["f_s"] + own["f_d"]},
-    ("backlash", "stiction"): lambda own: {"f_s": 0.6 * own["band"], "f_d": 0.4 * own["band"]},
-}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,15 +73,9 @@ def _rivals(found: Discrepancy) -> dict[Name, Behaviour]:
     for effect in found.effects:
         if not effect.alternatives:
             continue
-        values = dict(effect.parameters)
-        head = {"effect": effect.effect} | ({} if effect.law is None else {"law": effect.law})
-        rivals: dict[Name, Behaviour] = {(effect.place, effect.effect): from_mapping(head | values)}
-        for place, name in effect.alternatives:
-            same = _SAME.get((effect.effect, name))
-            if same is not None:
-                rivals[place, name] = from_mapping({"effect": name} | dict(same(values)))
-            else:
-                rivals |= _fitted(found, (place, name))
+        rivals: dict[Name, Behaviour] = {(effect.place, effect.effect): effect.behaviour}
+        for key in effect.alternatives:
+            rivals |= _fitted(found, key) or _alike(effect, key)
         if len(rivals) > 1:
             return dict(list(rivals.items())[:MOST])
     found_alone: dict[Name, Behaviour] = {}
@@ -105,11 +86,18 @@ def _rivals(found: Discrepancy) -> dict[Name, Behaviour]:
 
 def _fitted(found: Discrepancy, key: Name) -> dict[Name, Behaviour]:
     """Return a rival with the figures that fitted the record best, where it was tried."""
-    for look in reversed(found.looks):
-        for fit in look.scores.fits:
-            if fit.candidate.key == key:
-                return {} if fit.behaviour is None else {key: fit.behaviour}
-    return {}
+    tried = (fit for look in found.looks for fit in look.scores.fits if fit.candidate.key == key)
+    best = max(tried, key=lambda fit: fit.delta_bic, default=None)
+    return {key: best.behaviour} if best is not None and best.behaviour is not None else {}
+
+
+def _alike(effect: FoundEffect, key: Name) -> dict[Name, Behaviour]:
+    """Return a rival that no record tells from an effect, with the figures of that effect."""
+    own = effect.parameters
+    keys = [p.key for p in about(key[1]).parameters()]
+    if any(each not in own for each in keys):
+        return {}
+    return {key: from_mapping({"effect": key[1]} | {each: own[each] for each in keys})}
 
 
 def _moves(model: LoopModel, valve: int, rivals: Mapping[Name, Behaviour]) -> FloatArray:
