@@ -2,9 +2,8 @@
 
 import dataclasses
 
+from stiction_ros.discrepancy.measures import MARGIN
 from stiction_ros.errors import InputError
-
-MARGIN = 10.0
 
 
 @dataclasses.dataclass(frozen=True)

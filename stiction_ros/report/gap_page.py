@@ -111,8 +111,9 @@ def _listed(lines: Sequence[str]) -> str:
 def _gate(found: Discrepancy) -> str:
     gate = found.gate
     lines = []
+    runs = found.runs
     for name, quantum, usable in zip(
-        found.model_before.outputs, gate.quantum, gate.usable, strict=True
+        found.model_before.outputs, runs.lattices, runs.usable, strict=True
     ):
         rounded = f", in steps of {number(quantum)}" if quantum else ""
         lines.append(f"{name}: {100.0 * float(usable.mean()):.1f} % of PV can be scored{rounded}")

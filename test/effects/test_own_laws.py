@@ -12,8 +12,8 @@ from stiction_ros import effects
 from stiction_ros.cli.gap import _print as _print_gap
 from stiction_ros.cli.identify import _print
 from stiction_ros.config_files import find_config
-from stiction_ros.discrepancy import GapOptions, GapVerdict, find_discrepancy
-from stiction_ros.discrepancy.answer.found_effects import FoundEffect, units_of
+from stiction_ros.discrepancy import GapOptions, find_discrepancy
+from stiction_ros.discrepancy.answer.found_effects import FoundEffect
 from stiction_ros.discrepancy.answer.say import called
 from stiction_ros.discrepancy.candidate.plugged import (
     PluggedOutput,
@@ -226,8 +226,7 @@ def test_gap_names_the_law_in_its_table_and_sentences(
     assert called("valve:V1", "stiction", "xch") == "stiction (xch) of valve V1"
     xch = effects.XchStiction(2.0, 1.0)
     effect = FoundEffect(
-        *("valve:V1", "stiction", "xch", {"f_s": 2.0}, units_of(xch, "valve:V1"), {}),
-        *(50.0, 0.9, GapVerdict.NAMED, (), "It gains 50 BIC over no effect"),
+        "valve:V1", xch, 50.0, closed=0.9, sentence="It gains 50 BIC over no effect"
     )
     assert (effect.to_dict()["effect"], effect.to_dict()["law"]) == ("stiction", "xch")
     found = find_discrepancy(loop(), [simulate(loop(), samples=300)], GapOptions(quick=True))

@@ -7,14 +7,8 @@ import numpy as np
 import pytest
 
 from stiction_ros.config_files import find_config
-from stiction_ros.discrepancy import (
-    Discrepancy,
-    FoundEffect,
-    GapOptions,
-    GapVerdict,
-    find_discrepancy,
-)
-from stiction_ros.effects import from_mapping
+from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapOptions, find_discrepancy
+from stiction_ros.effects import HeStiction, from_mapping
 from stiction_ros.loop import LoopModel, SetPoints, simulate
 from stiction_ros.report.gap_page import WINDOW, _liveliest, report_gap
 from stiction_ros.report.gap_words import figures_with_units
@@ -53,14 +47,10 @@ def test_every_figure_has_a_name_and_a_unit(said: str, lagging: Discrepancy) -> 
 def test_a_figure_has_the_digits_that_its_interval_tells() -> None:
     effect = FoundEffect(
         "valve:V1",
-        "stiction",
-        None,
-        {"f_s": 5.8874, "f_d": 3.5},
-        {"f_s": "%", "f_d": "%"},
+        HeStiction(5.8874, 3.5),
+        1470.0,
         {"f_s": (5.868, 5.8929), "f_d": (1.0, 4.0)},
-        delta_bic=1470.0,
         closed=1.0,
-        verdict=GapVerdict.NAMED,
     )
     static, dynamic = figures_with_units(effect)
     assert "5.887 %, 95 % between 5.868 and 5.893" in static

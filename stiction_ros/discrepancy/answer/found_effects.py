@@ -33,21 +33,41 @@ FACTOR = "factor"  # of a gain, 1 where it is the model's
 class FoundEffect:
     """One effect that the simulation lacked."""
 
-    place: str  # place, effect: as loop models name them
-    effect: str
-    law: str | None  # which of several laws of one effect, or None
-    parameters: Mapping[str, float]  # in engineering units, times in seconds since the first sample
-    units: Mapping[str, str]  # of the parameters
-    intervals: Mapping[str, tuple[float, float]]  # 95 % of each parameter that has one
+    place: str  # as loop models name it
+    behaviour: Behaviour  # with its figures, times in seconds since the first sample
     delta_bic: float  # BIC by which it beats the model without it
+    # 95 % of each parameter that has one
+    intervals: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     # share of the free-run excess that goes when it is added last; NaN where no free run shows it
-    closed: float
-    verdict: GapVerdict  # named or ambiguous
+    closed: float = math.nan
+    verdict: GapVerdict = GapVerdict.NAMED  # named or ambiguous
     # places and effects that the record does not tell from it
     alternatives: tuple[tuple[str, str], ...] = ()
     sentence: str = ""  # why this effect was named, and not a rival
     # what it adds to the free run, shape (N, p), units of PV; None for what no free run shows
     moves: FloatArray | None = dataclasses.field(default=None, compare=False, repr=False)
+
+    @property
+    def effect(self) -> str:
+        """What it is, as loop models name it."""
+        return self.behaviour.effect
+
+    @property
+    def law(self) -> str | None:
+        """Which of several laws of one effect; None where there is one."""
+        return self.behaviour.law
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Its figures in engineering units."""
+        return figures_of(self.behaviour)
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of the parameters; a valve's signal is in %."""
+        kind, _, tag = self.place.partition(":")
+        signal = "%" if kind in ("valve", "load") else f"units of {tag}"
+        return {p.key: p.unit.replace("signal", signal) for p in self.behaviour.parameters()}
 
     @property
     def title(self) -> str:
@@ -71,27 +91,10 @@ class FoundEffect:
         }
 
 
-def units_of(behaviour: Behaviour, place: str) -> dict[str, str]:
-    """Return the units of an effect's parameters by key; a valve's signal is in %."""
-    kind, _, tag = place.partition(":")
-    signal = "%" if kind in ("valve", "load") else f"units of {tag}"
-    return {p.key: p.unit.replace("signal", signal) for p in behaviour.parameters()}
-
-
 def of_data(finding: DataFinding) -> FoundEffect:
     """Return a finding of the values or of the record as an effect."""
-    return FoundEffect(
-        finding.place,
-        finding.effect,
-        finding.behaviour.law,
-        figures_of(finding.behaviour),
-        units_of(finding.behaviour, finding.place),
-        {},
-        finding.delta_bic,
-        math.nan,
-        GapVerdict.NAMED,
-        sentence="The recorded values themselves show it, before any model is asked",
-    )
+    said = "The recorded values themselves show it, before any model is asked"
+    return FoundEffect(finding.place, finding.behaviour, finding.delta_bic, sentence=said)
 
 
 def of_noise(laws: Sequence[NoiseEffect], declared: float, margin: float) -> FoundEffect:
@@ -105,15 +108,11 @@ def of_noise(laws: Sequence[NoiseEffect], declared: float, margin: float) -> Fou
     best, *others = named_laws(laws, margin)
     return FoundEffect(
         best.place,
-        best.behaviour.effect,
-        best.behaviour.law,
-        figures_of(best.behaviour),
-        units_of(best.behaviour, best.place),
-        best.intervals,
+        best.behaviour,
         declared - best.score,
-        math.nan,
-        GapVerdict.AMBIGUOUS if others else GapVerdict.NAMED,
-        tuple((each.place, each.behaviour.effect) for each in others),
+        best.intervals,
+        verdict=GapVerdict.AMBIGUOUS if others else GapVerdict.NAMED,
+        alternatives=tuple((each.place, each.behaviour.effect) for each in others),
         sentence="What no other effect explains wanders without a relation to OP, more than the "
         "noise that the model declares",
     )

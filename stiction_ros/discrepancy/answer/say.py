@@ -8,16 +8,16 @@ import numpy as np
 from stiction_ros.discrepancy.answer.found_effects import FoundEffect
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.base import figures_of
+from stiction_ros.discrepancy.candidate.output import LONGEST_DELAY
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate, valve_candidates
 from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.decision.scores import Testable
+from stiction_ros.discrepancy.measures import MAJORITY
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Behaviour, FloatArray, about
 
 LEFT = 0.4  # of the last effect's score: what may stay unexplained beside a name
-LATEST = 20  # samples that a stem may come late
-TELLS = 0.5  # of the squared distance from OP that an effect has to explain to be told
 ACCURATE = 0.01  # of the span of OP: a stem that near follows it
 
 
@@ -148,8 +148,7 @@ class StemLook:
     off: float  # root mean square of stem less where the model has it, %, a constant taken out
     constant: float  # that constant, %
     moved: bool  # whether the model moves it by anything but OP
-    # samples by which the stem matches that best; 0 as well where it may be more than ``LATEST``
-    late: int
+    late: int  # samples by which the stem matches that best; 0 as well where it may be more
     # the effect of the valve that explains most of the distance; None where none explains enough
     behaviour: Behaviour | None
     share: float  # of the squared distance that it explains, 0 to 1
@@ -192,7 +191,7 @@ def _look(run: FreeRun, valve: int) -> StemLook:
     op = run.stems[:, valve]
     constant = float(np.median(stem - op))
     before = _left(stem, op[:, None])[0]
-    best, share = None, TELLS
+    best, share = None, MAJORITY
     for candidate in valve_candidates(run):
         if not isinstance(candidate, ValveCandidate) or candidate.valve != valve:
             continue
@@ -200,14 +199,15 @@ def _look(run: FreeRun, valve: int) -> StemLook:
         gone = 1.0 - left / max(float(before), 1e-300)
         if gone > share:
             best, share = candidate.behaviour(point, np.zeros(0)), gone
-    shifted = [_left(stem[late:], op[: len(op) - late, None])[0] for late in range(LATEST + 1)]
+    lates = range(LONGEST_DELAY + 1)
+    shifted = [_left(stem[late:], op[: len(op) - late, None])[0] for late in lates]
     late = int(np.argmin(shifted))
     return StemLook(
         name,
         float(np.sqrt(before / len(stem))),
         constant,
         bool(run.model.valves[valve].effects),
-        late if late < LATEST else 0,
+        late if late < LONGEST_DELAY else 0,
         best,
         share if best is not None else 0.0,
         float(np.ptp(op)),

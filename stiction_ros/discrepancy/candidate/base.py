@@ -127,32 +127,6 @@ class Candidate(ABC):
                 break
         return chosen
 
-    def scattered(
-        self, point: FloatArray, cube: FloatArray, size: float, *, any_start: bool = False
-    ) -> FloatArray:
-        """Return values in a box around a point, shape (G, axes); for needles alone.
-
-        Args:
-            point: values, shape (axes,).
-            cube: points between −1 and 1, shape (G, axes).
-            size: of the box, 1 for the largest.
-            any_start: whether a stem may have stood anywhere before the first sample.
-        """
-        raise NotImplementedError(f"{self.name} is no needle")
-
-    def along(self, point: FloatArray, cube: FloatArray) -> FloatArray:
-        """Return values along the valley of a point, over its whole length; for needles alone.
-
-        Args:
-            point: values, shape (axes,).
-            cube: points between −1 and 1, shape (G, axes).
-        """
-        raise NotImplementedError(f"{self.name} is no needle")
-
-    def valley(self, point: FloatArray) -> float:
-        """Return the figure that any record tells well, by which valleys differ, in logarithms."""
-        raise NotImplementedError(f"{self.name} is no needle")
-
     def lead(self, point: FloatArray) -> float:
         """Return how far from OP a stem stands before the first sample, %."""
         return 0.0

@@ -176,18 +176,6 @@ class GainChange(_Decoy):
     factors: int = 2
     dated: bool = True
 
-    @classmethod
-    def of(cls, run: FreeRun, output: int) -> Self:
-        """Return the rival of an output by its index."""
-        tag, last = run.model.outputs[output], float(run.runs.time.max())
-        steps = [(f"load:{valve}", "step") for valve in run.model.valve_names]
-        return cls(
-            place=f"process:{tag}",
-            axes=(Axis(0.1 * last, 0.9 * last, 17),),
-            contains=((f"disturbance:{tag}", "step"), *steps),
-            output=output,
-        )
-
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         late = (run.runs.time[:, None] >= points[:, 0]).astype(float)
         free = run.forced[:, self.output, None] - run.forced[:, self.output].mean()
@@ -200,14 +188,6 @@ class Trend(_Decoy):
 
     effect: str = "slow load"
     factors: int = KNOTS
-
-    @classmethod
-    def of(cls, run: FreeRun, output: int) -> Self:
-        """Return the rival of an output by its index."""
-        place = f"disturbance:{run.model.outputs[output]}"
-        places = (place, *(f"load:{valve}" for valve in run.model.valve_names))
-        walks = tuple((each, "random_walk") for each in places)
-        return cls(place=place, contains=walks, output=output)
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         from scipy.interpolate import BSpline
@@ -225,14 +205,6 @@ class Dynamics(_Decoy):
     effect: str = "other dynamics"
     factors: int = len(LAGS) + 1
     most_of: float = 0.8  # lags between samples are not quite those of held signals
-
-    @classmethod
-    def of(cls, run: FreeRun, output: int) -> Self:
-        """Return the rival of an output by its index."""
-        place = f"process:{run.model.outputs[output]}"
-        parts = [(place, name) for name in ("pole", "delay", "gain")]
-        lags = [(f"valve:{valve}", "lag") for valve in run.model.valve_names]
-        return cls(place=place, contains=(*parts, *lags), output=output)
 
     @property
     def absorbed(self) -> bool:
@@ -254,8 +226,17 @@ class Dynamics(_Decoy):
 def decoys(run: FreeRun) -> list[Candidate]:
     """Return the rivals outside the catalogue for every output."""
     found: list[Candidate] = []
-    for i in range(run.forced.shape[1]):
-        found += [Trend.of(run, i)]
+    last, valves = float(run.runs.time.max()), run.model.valve_names
+    for i, tag in enumerate(run.model.outputs):
+        process, added = f"process:{tag}", f"disturbance:{tag}"
+        places = (added, *(f"load:{valve}" for valve in valves))
+        walks = tuple((place, "random_walk") for place in places)
+        found.append(Trend(place=added, output=i, contains=walks))
         if float(np.ptp(run.forced[:, i])) > 0.0:
-            found += [GainChange.of(run, i), Dynamics.of(run, i)]
+            steps = tuple((place, "step") for place in places)
+            axes = (Axis(0.1 * last, 0.9 * last, 17),)
+            found.append(GainChange(place=process, output=i, axes=axes, contains=steps))
+            parts = [(process, name) for name in ("pole", "delay", "gain")]
+            lags = [(f"valve:{valve}", "lag") for valve in valves]
+            found.append(Dynamics(place=process, output=i, contains=(*parts, *lags)))
     return found

@@ -15,6 +15,7 @@ from stiction_ros.discrepancy.candidate.base import (
     late_axes,
     later,
 )
+from stiction_ros.discrepancy.measures import ROUNDING
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
 from stiction_ros.effects import (
     Axis,
@@ -37,10 +38,9 @@ SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best
 LEAST_BEND = 0.01  # of what a valve travels: straighter is a gain
 STATIONS = 101  # of the travel of a valve, at which its curve has to rise
 LEAST_TRAVEL = 0.05  # of the span of OP
-AT_REST = 1.0 - 1e-9  # of half a deadband, how far off OP a stem may stand: it rests at the edge
+AT_REST = 1.0 - ROUNDING  # of half a deadband, how far off OP a stem rests at its edge
 SHORT_OF_A_SLIP = 0.98  # of f_S; where there is a jump it rests at f_D, well inside
 LEAST_JUMP = 0.05  # of the band: less may be what the stem moves between two samples
-_NEGLIGIBLE = 1e-9
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -107,7 +107,7 @@ class ValveCandidate(Candidate):
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         stems = self.stems(run, points)
-        shifts, least = {}, _NEGLIGIBLE * max(float(np.ptp(run.forced)), 1e-9)
+        shifts, least = {}, ROUNDING * max(float(np.ptp(run.forced)), 1e-9)
         for i in range(run.forced.shape[1]):
             if not run.responses.reaches(i, self.valve):
                 continue
@@ -149,10 +149,16 @@ class StictionCandidate(ValveCandidate):
     def scattered(
         self, point: FloatArray, cube: FloatArray, size: float, *, any_start: bool = False
     ) -> FloatArray:
-        """Return points around one in the sum of the frictions and their difference, the jump.
+        """Return points, shape (G, axes), in a box around one.
 
-        The sum, how far OP goes back before the stem follows, is told well by any record; the
-        jump much less.
+        It is a box in the sum of the frictions and their difference, the jump. The sum, how far OP
+        goes back before the stem follows, is told well by any record; the jump much less.
+
+        Args:
+            point: values, shape (axes,).
+            cube: points between −1 and 1, shape (G, axes).
+            size: of the box, 1 for the largest.
+            any_start: whether a stem may have stood anywhere before the first sample.
         """
         total, jump = point[0] * (1.0 + point[1]), point[0] * (1.0 - point[1])
         totals = total * np.exp(SUM_BOX * size * cube[:, 0])
@@ -162,11 +168,12 @@ class StictionCandidate(ValveCandidate):
         return self._points(totals, jumps, leads)
 
     def along(self, point: FloatArray, cube: FloatArray) -> FloatArray:
-        """Return points of about the same sum of the frictions, with any jump and any start."""
+        """Return points, shape (G, axes), of about the same sum, with any jump and any start."""
         totals = math.exp(self.valley(point)) * np.exp(SUM_BOX * cube[:, 0])
         return self._points(totals, 0.5 * totals * (1.0 + cube[:, 1]), cube[:, 2])
 
     def valley(self, point: FloatArray) -> float:
+        """Return the logarithm of the sum of the frictions, by which valleys differ."""
         return math.log(float(point[0] * (1.0 + point[1])))
 
     def _points(self, totals: FloatArray, jumps: FloatArray, leads: FloatArray) -> FloatArray:

@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 
+from stiction_ros.discrepancy.data.filled import FLOAT
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
 from stiction_ros.discrepancy.data.scans import Scans, errors_of, law_terms, scanned_twice
 from stiction_ros.discrepancy.data.set_point import NORMAL_OF_MEDIAN, told_set_points
 from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
+from stiction_ros.discrepancy.measures import NEARLY_ALL
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
@@ -23,9 +25,6 @@ COARSEST = 0.2  # of the moves of OP: coarser rounding makes the gain seem small
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
 FINE = 0.02  # of the span of OP: values that are chosen are rounder than what rounding shows
 FINEST = 1e-4  # of the span of OP: what is finer says nothing
-DIGITS = 1e-7  # of the span of OP, that its digits may leave
-NEARLY_ALL = 0.9  # of the samples: where OP rests more often, no scan lies between them
-HALF = 0.5  # of a sample, for which an OP between two samples is held
 MATTERS = 0.05  # of gain and integral time: nearer ones are the same tuning
 
 
@@ -59,10 +58,6 @@ class ControllerCheck:
     # whether OP is rounded and no tuning known: it may be another between the samples
     between: bool = False
 
-    def op(self, runs: Runs) -> FloatArray:
-        """Return the OP of the records as the law tells it, %, shape (N, m)."""
-        return runs.op if self.scans is None else self.scans.op
-
 
 NOT_ASKED = ControllerCheck(ControllerStatus.NOT_ASKED, None, 1.0, False)
 
@@ -93,10 +88,10 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
         keep = 1.0 - often if often <= MANY else 0.0
         beside = [Unseen(quantum**2 / 12.0, keep)] if quantum > 0.0 else []
         beside += [] if check.unsure is None else [check.unsure]
-        if asked and often > NEARLY_ALL:
+        if asked and often > NEARLY_ALL:  # where OP rests more often, no scan lies between samples
             bends = np.concatenate([0.5 * np.diff(op[rows], 2) for rows in runs.slices])
             spread = NORMAL_OF_MEDIAN * float(np.median(np.abs(bends)))
-            beside.append(Unseen((HALF * spread) ** 2))
+            beside.append(Unseen((0.5 * spread) ** 2))  # it is held for half a sample
         found.append(tuple(beside))
     return tuple(found)
 
@@ -110,9 +105,9 @@ def _chosen(values: FloatArray) -> float:
     span = float(np.ptp(values))
     quantum = 0.0
     for step in np.diff(distinct).tolist():
-        while step > DIGITS * span:
+        while step > FLOAT * span:
             quantum, step = step, math.fmod(quantum, step)
-            step = 0.0 if quantum - step <= DIGITS * span else step
+            step = 0.0 if quantum - step <= FLOAT * span else step
     return quantum if FINEST * span < quantum <= FINE * span else 0.0
 
 
@@ -124,23 +119,21 @@ def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
     single = len(model.valves) == 1 and len(model.outputs) == 1
     if not single:
         return NOT_ASKED
-    if any(record.sp is None for record in runs.records):
-        return _told(model, runs)
-    return _asked(model, runs)
-
-
-def _told(model: LoopModel, runs: Runs) -> ControllerCheck:
-    """Return what the set-points show that a law tells: that law has to give OP."""
+    if all(record.sp is not None for record in runs.records):
+        return _compared(model, runs)
     once, twice = (_told_by(model, runs, scans) for scans in (1, 2))
     return once if once.left <= ONCE or twice.scans is None else twice
 
 
 def _told_by(model: LoopModel, runs: Runs, scans: int) -> ControllerCheck:
-    """Return what the set-points show that a law of one or two scans in a sample tells."""
+    """Return what the set-points show that a law of one or two scans in a sample tells.
+
+    That law has to give OP.
+    """
     told = told_set_points(model, runs, scans)
     if told is None:
         return NOT_ASKED
-    check = _asked(dataclasses.replace(model, controller=told.tuning), told.runs)
+    check = _compared(dataclasses.replace(model, controller=told.tuning), told.runs)
     most = EXACT if check.scans is None else TWICE
     if check.status is not ControllerStatus.SAME or check.left > most:
         return NOT_ASKED
@@ -148,16 +141,6 @@ def _told_by(model: LoopModel, runs: Runs, scans: int) -> ControllerCheck:
         return check
     error = check.scans.gain * told.error
     return dataclasses.replace(check, unsure=Unseen(error**2, 1.0 - 1.0 / told.rest))
-
-
-def _asked(model: LoopModel, runs: Runs) -> ControllerCheck:
-    """Return what the set-points of the records show."""
-    check = _compared(model, runs)
-    same = check.status is ControllerStatus.SAME and check.scans is None
-    quantum = quantum_of(runs.op[:, 0])
-    if not same or quantum <= 0.0:
-        return check
-    return dataclasses.replace(check, between=model.controller is None)
 
 
 def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
@@ -185,14 +168,16 @@ def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
     if law.left > max(EXACT, ROUNDED * min(_rounding(runs, law), COARSEST)):
         return ControllerCheck(ControllerStatus.UNEXPLAINED, None, law.left, False)
     if recorded is None and best == 0:
-        return ControllerCheck(ControllerStatus.SAME, None, law.left, True)
+        rounded = quantum_of(runs.op[:, 0]) > 0.0
+        return ControllerCheck(ControllerStatus.SAME, None, law.left, True, between=rounded)
     if best > 0:
-        finding = _finding("time_shift", TimeShift(float(best)), own, laws[0], law)
+        before = own if math.isfinite(own) else laws[0].left
+        finding = _finding(TimeShift(float(best)), before, law)
     else:
         assert recorded is not None
         if _alike(recorded, law):
             return ControllerCheck(ControllerStatus.SAME, None, own, False)
-        finding = _finding("tuning", Tuning(law.gain, law.integral_time), own, None, law)
+        finding = _finding(Tuning(law.gain, law.integral_time), own, law)
     return ControllerCheck(ControllerStatus.OTHER, finding, law.left, True)
 
 
@@ -223,13 +208,11 @@ def _alike(recorded: PiTuning, law: _Law | Scans) -> bool:
     return all(1.0 / (1.0 + MATTERS) < ratio < 1.0 + MATTERS for ratio in ratios)
 
 
-def _finding(
-    effect: str, behaviour: Tuning | TimeShift, own: float, before: _Law | None, law: _Law
-) -> DataFinding:
-    reference = own if math.isfinite(own) else (before or law).left
-    ratio = max(reference, 1e-6) / max(law.left, 1e-6)
+def _finding(behaviour: Tuning | TimeShift, before: float, law: _Law) -> DataFinding:
+    """Return what is wrong, by the shares of the moves of OP that are left without and with it."""
+    ratio = max(before, 1e-6) / max(law.left, 1e-6)
     gain = 2.0 * law.samples * math.log(max(ratio, 1.0)) - 2.0 * math.log(max(law.samples, 2))
-    return DataFinding("data", effect, behaviour, gain)
+    return DataFinding("data", behaviour, gain)
 
 
 def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, FloatArray]:

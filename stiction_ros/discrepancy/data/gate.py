@@ -8,6 +8,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.filled import drawn, held
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
+from stiction_ros.discrepancy.measures import MAJORITY
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
 from stiction_ros.effects.behaviour import BoolArray, IntArray
@@ -21,7 +22,6 @@ SHOWN = (Freeze, Clip, Quantisation)
 """What is looked for here."""
 LONGEST_REST = 12
 ENDS = 6
-MOST_CLIPPED = 0.5  # of the rows: what stands at its ends more often is no clipped measurement
 ALIKE = 0.02  # share by which two quanta, or two ends over the range of PV, may differ
 LATTICE = 1e-3  # of the range of PV: coarser rounding makes single values stand out
 ALONE = 8.0  # usual distances from the mean of both neighbours, beyond which one is a spike
@@ -32,50 +32,38 @@ COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a fi
 class DataFinding:
     """An effect that the recorded values themselves show."""
 
-    place: str  # place, effect: as loop models name them
-    effect: str
+    place: str  # as loop models name it
     behaviour: Behaviour  # with its figures
     delta_bic: float  # by how much shorter the values are told with it
     record: int = 0  # index of the record
 
+    @property
+    def effect(self) -> str:
+        """What it is, as loop models name it."""
+        return self.behaviour.effect
+
 
 @dataclasses.dataclass(frozen=True)
 class Gate:
-    """What the data allow."""
+    """What the data themselves show."""
 
-    usable: BoolArray  # per output the rows whose PV is a measurement, shape (p, N)
     # frozen, clipped and rounded PVs, but for what the model has already
     findings: tuple[DataFinding, ...]
-    # per output the rows whose PV a historian held or drew between the values that it kept, shape
-    # (p, N)
-    filled: BoolArray
-    # per output the distance of PV's values; 0 where they are as good as continuous
-    quantum: tuple[float, ...]
-    rounding: tuple[float, ...]  # the same, where it is coarse enough to matter; 0 elsewhere
     # per output, over all records; None where SP is not recorded
     set_point_moves: tuple[int, ...] | None
     reversals: tuple[int, ...]  # of OP per valve
     notes: tuple[str, ...]  # remarks for people
     # per output, how many single samples far off both neighbours were left out
-    alone: tuple[int, ...] = ()
+    alone: tuple[int, ...]
 
 
 def open_gate(model: LoopModel, records: Sequence[Record]) -> tuple[Runs, Gate]:
-    """Return the records end to end, their usable rows marked, and what the gate saw.
+    """Return the records end to end, what of their PV is measured, and what the values show.
 
     Raises:
         InputError: as :func:`join_records`.
     """
     runs = join_records(model, records)
-    gate = look_at_data(model, runs)
-    seen = dataclasses.replace(
-        runs, usable=gate.usable, quanta=gate.rounding, filled=gate.filled, lattices=gate.quantum
-    )
-    return seen, gate
-
-
-def look_at_data(model: LoopModel, runs: Runs) -> Gate:
-    """Return what the recorded values allow, before any model is asked."""
     usable = np.ones((len(model.outputs), len(runs)), dtype=bool)
     filled = np.zeros_like(usable)
     findings: list[DataFinding] = []
@@ -117,12 +105,11 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
     for j, valve in enumerate(model.valve_names):
         if np.ptp(runs.op[:, j]) == 0.0:
             notes.append(f"OP of {valve} never moves: nothing can be said of that valve")
-    return Gate(
-        usable,
+    seen = dataclasses.replace(
+        runs, usable=usable, quanta=tuple(rounding), filled=filled, lattices=tuple(quanta)
+    )
+    return seen, Gate(
         tuple(findings),
-        filled,
-        tuple(quanta),
-        tuple(rounding),
         _moves(model, runs),
         tuple(_reversals(runs, op) for op in runs.op.T),
         tuple(dict.fromkeys(notes)),
@@ -224,7 +211,7 @@ def _frozen(
     behaviour = Freeze(float((first + 1) * sample_time), float((last - first) * sample_time))
     share = max(rests.share, 1.0 / len(values))
     gain = 2.0 * (last - first) * math.log(1.0 / share) - 2.0 * math.log(len(values))
-    return [(DataFinding(f"sensor:{name}", "freeze", behaviour, gain, record), where)]
+    return [(DataFinding(f"sensor:{name}", behaviour, gain, record), where)]
 
 
 def _leaps(values: FloatArray, first: int, last: int) -> bool:
@@ -264,11 +251,11 @@ def _clipped(
             gain += 2.0 * count * math.log(len(values) / 10.0)
         else:
             limits[k] += (2 * k - 1) * 10.0 * (high - low)  # beyond what was seen
-    if not ends or int(where.sum()) > MOST_CLIPPED * len(values):
-        return []
+    if not ends or int(where.sum()) > MAJORITY * len(values):
+        return []  # what stands at its ends more often is no clipped measurement
     gain -= ends * math.log(len(values))
     behaviour = Clip(limits[0], limits[1])
-    return [(DataFinding(f"sensor:{name}", "clip", behaviour, gain, record), where)]
+    return [(DataFinding(f"sensor:{name}", behaviour, gain, record), where)]
 
 
 def _rounded(runs: Runs, output: int, name: str, quantum: float) -> list[DataFinding]:
@@ -280,7 +267,7 @@ def _rounded(runs: Runs, output: int, name: str, quantum: float) -> list[DataFin
     gain = 2.0 * len(values) * math.log(max(len(values) / levels, 1.0)) - math.log(len(values))
     if gain <= 0.0:
         return []
-    return [DataFinding(f"sensor:{name}", "quantisation", Quantisation(quantum), gain)]
+    return [DataFinding(f"sensor:{name}", Quantisation(quantum), gain)]
 
 
 def _surprise(runs: Runs, output: int) -> float:

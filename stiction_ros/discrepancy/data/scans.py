@@ -5,13 +5,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.simulation.free_run import Runs
+from stiction_ros.discrepancy.simulation.free_run import FEWEST, Runs
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel
 
 LIKE_PV = (0.15, 2.0)  # times the spread of PV about its neighbours; a quarter where it is smooth
 USUAL = 6.0  # times the usual change of the error, beyond which SP has moved
-ROWS = 50  # that are asked at least
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +48,7 @@ def scanned_twice(model: LoopModel, runs: Runs) -> Scans | None:
     low, high = model.limits[0]
     h = 0.5 * runs.sample_time
     parts = _parts(model, runs)
-    if sum(int(np.isfinite(part.moves).sum()) for part in parts) < ROWS:
+    if sum(int(np.isfinite(part.moves).sum()) for part in parts) < FEWEST:
         return None
     laws = [_fitted(parts)]
     if model.controller is not None:

@@ -12,19 +12,16 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from stiction_ros.discrepancy.data.scans import between_samples
-from stiction_ros.discrepancy.simulation.free_run import Runs
+from stiction_ros.discrepancy.measures import MAJORITY, ROUNDING
+from stiction_ros.discrepancy.simulation.free_run import FEWEST, Runs
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel, PiTuning
 from stiction_ros.signals.holds import stretches
 
 TURNS = 30  # of the weights that make the sum of sizes least
-DIGITS = 1e-9  # of the largest move, that counts as nothing
 OUTSIDE = 8.0  # times the usual size of what a law leaves, beyond which SP has moved
 NORMAL_OF_MEDIAN = 1.4826  # σ of normal values, by the median of their sizes
 MOST_MOVES = 0.1  # of the samples: what moves more often is nothing that an operator sets
-FEWEST = 50  # samples in which OP is free
-MOSTLY = 0.5  # of the samples: where OP rests more often, somebody moves it
-LEFT = 0.5  # of the usual change of a move of OP, that a law may leave
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,9 +144,9 @@ def _law(
     """
     wanted = np.concatenate([np.diff(p.moves, prepend=0.0)[p.free] for p in parts])
     columns = np.vstack([-np.diff(p.columns, axis=0, prepend=p.columns[:1])[p.free] for p in parts])
-    if len(wanted) < FEWEST or np.mean(wanted != 0.0) < MOSTLY:
-        return None
-    nothing = DIGITS * float(np.abs(wanted).max())
+    if len(wanted) < FEWEST or np.mean(wanted != 0.0) < MAJORITY:
+        return None  # where OP rests more often, somebody moves it
+    nothing = ROUNDING * float(np.abs(wanted).max())
     if tuning is None:
         law, weights = np.zeros(2), np.ones(len(wanted))
         for _ in range(TURNS):
@@ -160,6 +157,7 @@ def _law(
         law = tuning.gain * np.array([1.0, interval / tuning.integral_time])
     gain, integral = law.tolist()
     usual = float(np.median(np.abs(wanted - columns @ law)))
-    if integral == 0.0 or gain / integral <= 0.0 or usual > LEFT * float(np.median(np.abs(wanted))):
+    left_over = usual > MAJORITY * float(np.median(np.abs(wanted)))
+    if integral == 0.0 or gain / integral <= 0.0 or left_over:
         return None
     return gain, integral, max(NORMAL_OF_MEDIAN * usual, nothing)

@@ -9,22 +9,19 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.fit.search import CandidateFit
+from stiction_ros.discrepancy.measures import MAJORITY, MARGIN, SURE
 from stiction_ros.discrepancy.simulation.free_run import HELD_SHARE, FreeRun
 from stiction_ros.effects import Backlash, FloatArray, Stiction, about
 
-JUMP_SURE = 10.0  # BIC by which a jump is there
 JUMP_ABSENT = 5.0
-"""BIC by which it is not: of the 7 that its figure costs in 1500 samples it gains 2, a chance."""
+"""BIC by which there is no jump: of the 7 that its figure costs in 1500 samples chance gains 2."""
 OFTEN = 8  # departures from rest that must show no jump before it is said to be absent
 CLEAR = 40.0  # BIC below which friction is told, but not of which kind
 FRICTION = "friction"  # families of effects
 LAGS = "lag"
-SURE = 20.0  # BIC above the margin, from which on there is a gap even where no name holds
 DOUBTFUL = 3.0  # standard deviations
 ONE_LAW = 0.05  # of the evidence of a lag, that another one in its path may explain less
 EQUAL = 1.0  # BIC by which two explanations differ that are one
-MOMENT = 10.0  # what held-out rows may lose by an effect of one moment
-CONFIRMED = 0.5  # of the squared distance that may be left
 
 
 class GapVerdict(enum.StrEnum):
@@ -161,7 +158,7 @@ def borne_out(delta_bic: float, held_gain: float, dated: bool) -> bool:
     shows in the block of that moment, the other blocks gain nothing but chance.
     """
     if dated:
-        return held_gain > -MOMENT
+        return held_gain > -MARGIN
     due = max(delta_bic, 0.0) / (HELD_SHARE - 1)
     return held_gain > min(0.0, due - DOUBTFUL * 2.0 * math.sqrt(due))
 
@@ -248,7 +245,7 @@ def friction_kind(
     if best.evidence < CLEAR:  # too little to tell whether there is a jump
         other = jumping[0] if best.candidate.effect == Backlash.effect else plain[0]
         return best, (other.candidate.key,)
-    if jump > JUMP_SURE and jumping[0].candidate.leaps(jumping[0].point):
+    if jump > MARGIN and jumping[0].candidate.leaps(jumping[0].point):
         return jumping[0], ()
     absent = jump < -JUMP_ABSENT and not jumping[0].candidate.leaps(jumping[0].point)
     if absent and departures(plain[0]) >= OFTEN:
@@ -282,7 +279,7 @@ def confirmed_by_stem(run: FreeRun, fit: CandidateFit) -> bool:
         return False
     stems = candidate.stems(run, fit.point[None, :], from_measured=True)[:, 0]
     now = stem_misfit(run, candidate.valve, run.stems[:, candidate.valve])
-    return stem_misfit(run, candidate.valve, stems) < CONFIRMED * now
+    return stem_misfit(run, candidate.valve, stems) < MAJORITY * now
 
 
 def told_by_stem(run: FreeRun, decision: Decision, fits: Sequence[CandidateFit]) -> Decision:

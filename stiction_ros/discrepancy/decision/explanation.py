@@ -12,11 +12,11 @@ from stiction_ros.discrepancy.decision.scores import all_candidates
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.likelihood.noise import NoiseFit
+from stiction_ros.discrepancy.measures import TURNS
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.loop import LoopModel
 
-EXTENSION_ROUNDS = 2
 TANGENT = 0.25  # steps of a search, by which figures are varied to see what they would do
 
 
@@ -173,7 +173,7 @@ def refit_together(
 ) -> list[AddedEffect]:
     """Return effects, each fitted again behind the others."""
     fitted = list(effects)
-    for _ in range(EXTENSION_ROUNDS if len(fitted) > 1 else 1):
+    for _ in range(TURNS if len(fitted) > 1 else 1):
         fitted = [_refit(bare, runs, fitted, k) for k in range(len(fitted))]
     return fitted
 

@@ -9,12 +9,12 @@ from stiction_ros.discrepancy.decision.decide import FRICTION, borne_out, stem_m
 from stiction_ros.discrepancy.decision.explanation import AddedEffect, Explanation, refit_together
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
+from stiction_ros.discrepancy.measures import MARGIN
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray
 from stiction_ros.signals.holds import stretches
 
 GROWN = 2.0  # standard errors by which the free-run error of the held-out blocks may grow
-WORTH = 10.0
 
 
 def extend(
@@ -32,7 +32,7 @@ def extend(
         The explanation with them; None where the new one does not stay, and why.
     """
     *others, new = refit_together(process.bare, process.runs, effects)
-    worth = [each for each in others if each.fit.delta_bic >= WORTH]
+    worth = [each for each in others if each.fit.delta_bic >= MARGIN]
     grown = process.holding([*worth, new])
     if not (lent or held_rows_bear_out(before, grown.base, dated=new.fit.candidate.dated)):
         return None, "the innovations of the held-out rows do not become smaller"

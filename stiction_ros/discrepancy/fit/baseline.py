@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from stiction_ros.discrepancy.likelihood.declared_noise import seen_noise
+from stiction_ros.discrepancy.likelihood.declared_noise import arx_equations, seen_noise
 from stiction_ros.discrepancy.likelihood.least_squares import projector, whitened_columns
 from stiction_ros.discrepancy.likelihood.noise import (
     Blocks,
@@ -18,7 +18,6 @@ from stiction_ros.discrepancy.likelihood.noise import (
 )
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray
-from stiction_ros.processes import AlteredProcess, ArxProcess
 
 BASES = 8  # of shared columns, that are kept for the next grids
 _FIRST_GUESSES = (None, np.array([0.99]))  # white and slow: the turns may end in either
@@ -97,12 +96,11 @@ class Baseline:
     @functools.cached_property
     def plausible(self) -> tuple[FloatArray, ...]:
         """Return per output φ of the declared noise, or of noise in its equation without one."""
-        process = self.run.model.process
-        inner = process.inner if isinstance(process, AlteredProcess) else process
+        equations = arx_equations(self.run.model.process)
         found = []
         for i, forms in enumerate(self.declared):
-            if not forms and isinstance(inner, ArxProcess):
-                forms = (-np.asarray(inner.equations[i].a, dtype=float),)
+            if not forms and equations is not None:
+                forms = (-np.asarray(equations[i].a, dtype=float),)
             found.append(forms[0] if forms else np.zeros(0))
         return tuple(found)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from stiction_ros.deferred import halton_sequence
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
+from stiction_ros.discrepancy.candidate.valve import StictionCandidate
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit, settled
 from stiction_ros.discrepancy.likelihood.declared_noise import behind_lag
@@ -18,10 +19,10 @@ from stiction_ros.discrepancy.likelihood.noise import (
     noise_forms,
     shared_factors,
 )
+from stiction_ros.discrepancy.measures import SURE
 from stiction_ros.effects import Behaviour, FloatArray
 
-LEADERS = 4
-STARTS = 4
+LEADERS = 4  # points that are looked at further, under each guess of the noise
 MOMENTS = 241
 REACH = 4.0  # points of the first grid, wider than a held-out block
 SLOW, SLOWER = np.array([0.8]), np.array([0.95])
@@ -35,7 +36,7 @@ CENTRES = 5
 COMBS = (0.1, 0.03, 0.01)  # boxes around the best point, of the largest
 TEETH, STROKES = 3000, 4  # points in each, and how often it is moved to a better one
 GAP_SEARCH_ROUNDS = 5
-FAIR, BEHIND = 3, 20.0  # rounds after which a start that is so far behind, in BIC, is given up
+FAIR = 3  # rounds after which a start that is surely behind is given up
 POLISHES = 8
 NEXT_TO_NOTHING = 0.02  # BIC
 NO_MEMORY = np.zeros(0)
@@ -81,7 +82,7 @@ def fit_candidate(
     """
     search = _Search(base, gap, candidate)
     if around is None:
-        centres = search.coarse()[:STARTS]
+        centres = search.coarse()[:LEADERS]
     else:
         search.judge(around, candidate.respond(base.run, around[None, :]))
         centres = [candidate.coordinates(around)]
@@ -164,7 +165,7 @@ class _Search:
         """Return the best points of the first grid under noises that blur sharp peaks."""
         grid, found = self.candidate.grid(), []
         for ar, squares in self.misfits:
-            found += [(ar, grid[k]) for k in self.candidate.apart(grid, squares, STARTS)]
+            found += [(ar, grid[k]) for k in self.candidate.apart(grid, squares, LEADERS)]
         return found
 
     def refine(self, centre: FloatArray, size: float, under: Under | None = None) -> None:
@@ -177,7 +178,7 @@ class _Search:
             return
         best = self._try(np.array([centre]), self.found, under)
         for done in range(GAP_SEARCH_ROUNDS):
-            if done >= FAIR and best[1].delta_bic < self.best().delta_bic - BEHIND:
+            if done >= FAIR and best[1].delta_bic < self.best().delta_bic - SURE:
                 break
             best = self._around(best, size, under)
             size *= SHRINK
@@ -206,6 +207,12 @@ class _Search:
         found = self._try(best[0] + offsets * span, best[1], under)
         return found if under is not None or found[1].delta_bic >= best[1].delta_bic else best
 
+    @property
+    def needle(self) -> StictionCandidate:
+        """The candidate, whose optimum is narrower than any lattice is fine."""
+        assert isinstance(self.candidate, StictionCandidate)
+        return self.candidate
+
     def scatter(self) -> None:
         """Search scattered points in ever smaller boxes around the best point.
 
@@ -215,7 +222,7 @@ class _Search:
         """
         halton = halton_sequence(len(self.candidate.axes), seed=0)
         for fit in self._valleys():
-            values = self.candidate.along(fit.point, 2.0 * halton.random(ALONG) - 1.0)
+            values = self.needle.along(fit.point, 2.0 * halton.random(ALONG) - 1.0)
             response = self.candidate.respond(self.base.run, values)
             for ar in (NO_MEMORY, SLOWER, self.base.noise[0].searched):
                 squares = misfit(self.base, self.gap, response, dict.fromkeys(response.outputs, ar))
@@ -228,7 +235,7 @@ class _Search:
             parts = np.split(cubes, len(leading))
             values = np.vstack(
                 [
-                    self.candidate.scattered(fit.point, cube, size)
+                    self.needle.scattered(fit.point, cube, size)
                     for fit, cube in zip(leading, parts, strict=True)
                 ]
             )
@@ -248,7 +255,7 @@ class _Search:
             for _ in range(STROKES):
                 best = self.best()
                 cube = 2.0 * halton.random(TEETH) - 1.0
-                values = self.candidate.scattered(best.point, cube, size, any_start=True)
+                values = self.needle.scattered(best.point, cube, size, any_start=True)
                 response = self.candidate.respond(self.base.run, values)
                 self.best_of(values, response, [best.noise, self.base.noise])
                 self._judge_best(values, response, dict.fromkeys(response.outputs, NO_MEMORY))
@@ -259,8 +266,8 @@ class _Search:
         """Return the best fits so far, each in a valley of its own."""
         found: list[CandidateFit] = []
         for fit in sorted(self.judged.values(), key=lambda fit: -fit.delta_bic):
-            own = self.candidate.valley(fit.point)
-            if all(abs(own - self.candidate.valley(each.point)) > WIDE for each in found):
+            own = self.needle.valley(fit.point)
+            if all(abs(own - self.needle.valley(each.point)) > WIDE for each in found):
                 found.append(fit)
             if len(found) == VALLEYS:
                 break

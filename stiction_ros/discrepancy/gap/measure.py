@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise, seen_noise
+from stiction_ros.discrepancy.likelihood.declared_noise import LONGEST, declared_noise, seen_noise
 from stiction_ros.effects import FloatArray
 from stiction_ros.signals.autoregression import whiten
 from stiction_ros.texts import spoken
 
 LARGER = 1.25  # times the declared standard deviation, beyond which they disagree
-LAGS = 20
 SOME_STEPS = 3.0  # of the rounding
 
 
@@ -197,7 +196,7 @@ def _memory(base: Baseline, output: int) -> int:
     whole = float(values @ values)
     if whole <= 0.0:
         return 0
-    shares = [float(values[lag:] @ values[:-lag]) / whole for lag in range(1, LAGS + 1)]
+    shares = [float(values[lag:] @ values[:-lag]) / whole for lag in range(1, LONGEST + 1)]
     return 1 + int(np.argmax(np.abs(shares)))
 
 

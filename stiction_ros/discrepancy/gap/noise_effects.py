@@ -20,18 +20,17 @@ from stiction_ros.discrepancy.gap.noise_laws import (
     white_block,
 )
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
-from stiction_ros.discrepancy.likelihood.noise import ENLARGED, SURPRISE
+from stiction_ros.discrepancy.likelihood.noise import SURPRISE
 from stiction_ros.discrepancy.likelihood.state_noise import innovations, left_by_columns
+from stiction_ros.discrepancy.measures import MARGIN, NORMAL
 from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
 from stiction_ros.signals.autoregression import TINY
 
 CLOSE, SAME, TURNS = 1e-2, 0.05, 60  # of the search: figures, their likelihood, turns
-SIDES = (-1.0, 1.0)
 REJECTED = 8.0  # −2 log likelihood, above that of the best figures
 SHORTEST_WAY = 1e-3
 FLAT = 1e-3  # curvature of the likelihood over a logarithm, below which it has none
 CLEAR = 0.3  # by which the logarithm of a figure has to be inside of its range
-NORMAL = 1.96
 NO_LAW = 30.0  # BIC by which a law may miss an autoregression and still be its name
 
 
@@ -95,7 +94,7 @@ def _without_walks(laws: list[NoiseEffect], lasts: float) -> list[NoiseEffect]:
         for each in laws
         if not isinstance(each.behaviour, ColouredDisturbance)
         or each.intervals["tau"][1] < lasts * math.exp(-CLEAR)
-        or each.score < min(walks, default=math.inf) - ENLARGED
+        or each.score < min(walks, default=math.inf) - MARGIN
     ]
 
 
@@ -172,16 +171,16 @@ class _Judge:
             return None  # a figure on the bound of its range is no name
         score = self.score(law.block(found))
         rows = max(int(self.blocks.train.sum()), 2)
-        price = len(found) * math.log(rows) + ENLARGED
+        price = len(found) * math.log(rows) + MARGIN
         first = np.eye(len(found))[0]  # is a size: σ is its unit
         behaviour = law.behaviour(found + math.log(score.louder) * first)
         ends = _ends(loss, found, law.range)
-        if not np.isfinite(ends).all():
+        if not all(np.isfinite(end).all() for _, end in ends):
             return None  # an interval that holds nothing out is no name
         figures = [figures_of(behaviour)]
-        for k, end in enumerate(ends):
+        for side, end in ends:
             scale = math.log(self.score(law.block(end)).louder)
-            scale += SIDES[k % 2] * NORMAL / math.sqrt(2.0 * rows)
+            scale += side * NORMAL / math.sqrt(2.0 * rows)
             figures.append(figures_of(law.behaviour(end + scale * first)))
         whole = score.fitted + score.held + price
         return NoiseEffect(law.place, behaviour, spans_of(figures), whole)
@@ -189,8 +188,8 @@ class _Judge:
 
 def _ends(
     loss: Callable[[FloatArray], float], found: FloatArray, limits: tuple[FloatArray, FloatArray]
-) -> list[FloatArray]:
-    """Return points at both ends of each figure's 95 % by the curvature of the likelihood."""
+) -> list[tuple[float, FloatArray]]:
+    """Return the side and the point of both ends of each figure's 95 %, by the curvature."""
     count, step = len(found), 0.1
     shifts = step * np.eye(count)
     centre = loss(found)
@@ -203,18 +202,18 @@ def _ends(
         plus, minus = loss(found + shifts[i]), loss(found - shifts[i])
         bend[i, i] = (plus + minus - 2.0 * centre) / step**2
     if not np.isfinite(bend).all():
-        return [np.array(limits[k]) for _ in found for k in range(2)]
+        return [(-1.0, limits[0]), (1.0, limits[1])]
     sizes, axes = np.linalg.eigh(0.5 * bend)
     spread = (axes / np.maximum(sizes, FLAT)) @ axes.T  # what does not bend is not known at all
     ways = NORMAL * spread / np.sqrt(np.diag(spread))  # each figure's end, the others at their best
     ends = []
     for way in ways.T:
-        for side in SIDES:  # a valley may be bent: back to what the likelihood does not reject
-            share = side
+        for side in (-1.0, 1.0):
+            share = side  # a valley may be bent: back to what the likelihood does not reject
             while abs(share) > SHORTEST_WAY:
                 end = np.clip(found + share * way, *limits)
                 if loss(end) < centre + REJECTED:
                     break
                 share *= 0.5
-            ends.append(end)
+            ends.append((side, end))
     return ends

@@ -9,9 +9,8 @@ from collections.abc import Callable
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
+from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise, arx_equations
 from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
-from stiction_ros.processes import AlteredProcess, ArxProcess
 from stiction_ros.signals.autoregression import companion
 from stiction_ros.signals.state_space import responses
 
@@ -125,11 +124,11 @@ def _walk_through(a: FloatArray, b: FloatArray, c: FloatArray, step: float, x: F
 def _path(base: Baseline, output: int, valve: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return A, b, c from a valve to an output; dead time delays a walk, which stays a walk."""
     process, name = base.run.model.process, base.run.model.valve_names[valve]
-    inner = process.inner if isinstance(process, AlteredProcess) else process
-    if not isinstance(inner, ArxProcess):
+    equations = arx_equations(process)
+    if equations is None:
         linear = process.linear(base.run.runs.sample_time)
         return linear.a, linear.b[:, valve], linear.c[output]
-    equation = inner.equations[output]
+    equation = equations[output]
     own = np.asarray(equation.b[name], dtype=float)
     count = max(len(equation.a), len(own))
     ar, b = np.pad(-np.asarray(equation.a), (0, count - len(equation.a))), np.zeros(count)

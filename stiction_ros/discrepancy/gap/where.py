@@ -6,15 +6,15 @@ import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
+from stiction_ros.discrepancy.measures import MAJORITY, MARGIN
+from stiction_ros.discrepancy.simulation.free_run import FEWEST
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.signals.holds import set_point_moves
 from stiction_ros.texts import spoken
 
 KNOTS = 60
-LEAST_ROWS = 30
 WEIGHTS = 10.0 ** np.arange(-3.0, 4.0)
 CLEAR = 1.5  # times the usual size of innovations
-STRONG = 0.5  # share of the gap's variance
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,25 +32,22 @@ class Where:
 
     sentences: tuple[str, ...]  # for people
     tracks: tuple[Track, ...]  # one per place, the one that gains most first
-    lines: tuple[float, ...]  # strongest period of the gap per output, s
 
 
 def locate(base: Baseline) -> Where:
     """Return where the gap of the current model is."""
     tracks = sorted(_tracks(base), key=lambda track: -track.gain)
     sentences: list[str] = []
-    lines = []
     for i, name in enumerate(base.run.model.outputs):
         sentences += _at_moments(base, i, name)
         period, share = _line(base, i)
-        lines.append(period)
-        if share > STRONG:
+        if share > MAJORITY:
             sentences.append(
                 f"{name}: {100 * share:.0f} % of the gap has a period of {spoken(period)}"
             )
-    if tracks and tracks[0].gain > 10.0:
+    if tracks and tracks[0].gain > MARGIN:
         sentences.append(f"a slow disturbance at {tracks[0].place} would close most of the gap")
-    return Where(tuple(sentences), tuple(tracks), tuple(lines))
+    return Where(tuple(sentences), tuple(tracks))
 
 
 def _at_moments(base: Baseline, output: int, name: str) -> list[str]:
@@ -69,7 +66,7 @@ def _at_moments(base: Baseline, output: int, name: str) -> list[str]:
             if ratio > CLEAR:
                 found.append(f"{name}: innovations are {ratio:.1f} times larger {what}")
     moment, ratio = _change(noise.residual, scored)
-    if ratio > STRONG:
+    if ratio > MAJORITY:
         at = spoken(base.run.runs.time[moment])
         found.append(f"{name}: the gap's level changes at {at}")
     return found
@@ -133,7 +130,7 @@ def _tracks(base: Baseline) -> list[Track]:
     hats = _hats(base)
     found = []
     for i, name in enumerate(run.model.outputs):
-        if int(base.blocks[i].train.sum()) < LEAST_ROWS:
+        if int(base.blocks[i].train.sum()) < FEWEST:
             continue
         found.append(_track(base, i, f"disturbance:{name}", hats, hats))
         for j, valve in enumerate(run.model.valves):

@@ -14,7 +14,7 @@ from stiction_ros.discrepancy.likelihood.slow_noise import NEGLIGIBLE, REMEMBERE
 from stiction_ros.discrepancy.likelihood.state_noise import steady_gain
 from stiction_ros.effects import ColouredDisturbance, FloatArray
 from stiction_ros.loop import LoopModel
-from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, NoiseEntry
+from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, NoiseEntry, Process
 from stiction_ros.signals.autoregression import companion
 
 LONGEST = 20  # samples that an autoregression of declared noises reaches back
@@ -34,14 +34,19 @@ class DeclaredNoise:
     ar: FloatArray  # φ of what the free run leaves, shape (p,); p = 0 for noise of the measurement
 
 
+def arx_equations(process: Process) -> tuple[ArxOutput, ...] | None:
+    """Return the equations of an ARX process, behind effects if any; None of another process."""
+    inner = process.inner if isinstance(process, AlteredProcess) else process
+    return inner.equations if isinstance(inner, ArxProcess) else None
+
+
 def declared_noise(model: LoopModel) -> tuple[DeclaredNoise | None, ...]:
     """Return the declared noise of every output; None where there is none, or no such form.
 
     Noise that enters the state of a process which is no ARX equation is coloured by more than
     poles; it is left to be found.
     """
-    process = model.process
-    inner = process.inner if isinstance(process, AlteredProcess) else process
+    process, equations = model.process, arx_equations(model.process)
     found: list[DeclaredNoise | None] = []
     for i, (name, noise) in enumerate(zip(process.outputs, process.noise, strict=True)):
         coloured = [
@@ -52,8 +57,8 @@ def declared_noise(model: LoopModel) -> tuple[DeclaredNoise | None, ...]:
             and isinstance(each.behaviour, ColouredDisturbance)
         ]
         of_equation = noise.std > 0.0 and noise.enters is NoiseEntry.EQUATION
-        if of_equation and not coloured and isinstance(inner, ArxProcess):
-            ar = -np.asarray(inner.equations[i].a, dtype=float)
+        if of_equation and not coloured and equations is not None:
+            ar = -np.asarray(equations[i].a, dtype=float)
             found.append(DeclaredNoise(noise.std, ar))
         elif of_equation or (noise.std <= 0.0 and not coloured):
             found.append(None)
@@ -164,10 +169,10 @@ def beside_unseen(
         quantum: distance of PV's values.
         unseen: per valve the parts of w.
     """
-    inner = model.process.inner if isinstance(model.process, AlteredProcess) else model.process
-    if not isinstance(inner, ArxProcess):
+    equations = arx_equations(model.process)
+    if equations is None:
         return None
-    passed, driven, shown = _of_op(inner.equations[output], model, unseen)
+    passed, driven, shown = _of_op(equations[output], model, unseen)
     white = quantum**2 / 12.0 + (0.0 if len(noise.ar) else noise.std**2)
     own = companion(noise.ar)
     excited = np.zeros(own.shape)

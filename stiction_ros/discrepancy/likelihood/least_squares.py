@@ -4,13 +4,13 @@ import numpy as np
 from scipy.linalg import qr
 
 from stiction_ros.compiled import compiled
+from stiction_ros.discrepancy.measures import ROUNDING
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
-from stiction_ros.signals.autoregression import inner_product, whitened_rows
+from stiction_ros.signals.autoregression import TINY, inner_product, whitened_rows
 
-VANISHED = 1e-9  # of a column, that whitening leaves of what it takes away
 APART = 1e-3  # of a scaled column, beside others: normal equations keep half of all digits
 DEPENDENT = 1e-10  # of a scaled column, beside others: it adds nothing to them
-NOTHING = 1e-150  # length of a column that is zero on the fitted rows
+NOTHING = TINY**0.5  # length of a column that is zero on the fitted rows
 
 
 @compiled
@@ -46,7 +46,7 @@ def whitened_columns(columns: FloatArray, ar: FloatArray, rows: BoolArray) -> Fl
 
     Noise of an equation that has settled hides how its run began.
     """
-    block = whitened_block(np.ascontiguousarray(columns.T), ar, rows, VANISHED)
+    block = whitened_block(np.ascontiguousarray(columns.T), ar, rows, ROUNDING)
     return np.asarray(block.T)
 
 
@@ -101,7 +101,7 @@ def _normal_equations(columns: FloatArray, target: FloatArray) -> tuple[bool, Fl
 def projector(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the columns, shape (n, r), numerical dependence left out."""
     if not columns.size:
-        return columns[:, :0]
+        return np.zeros((len(columns), 0))
     basis, left, _ = qr(columns / _lengths(columns), mode="economic", pivoting=True)
     sizes = np.abs(np.diag(left))
     return np.ascontiguousarray(basis[:, : int(np.sum(sizes > DEPENDENT * sizes[0]))])

@@ -8,7 +8,6 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.likelihood.least_squares import (
-    VANISHED,
     coefficients,
     left_by,
     projector,
@@ -16,6 +15,7 @@ from stiction_ros.discrepancy.likelihood.least_squares import (
     whitened_columns,
 )
 from stiction_ros.discrepancy.likelihood.slow_noise import FIGURES, slow_beside_white
+from stiction_ros.discrepancy.measures import MARGIN, ROUNDING
 from stiction_ros.effects import FloatArray
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.signals.autoregression import (
@@ -29,7 +29,6 @@ from stiction_ros.signals.autoregression import (
 MAX_ORDER = 6
 NOISE_FIT_ROUNDS = 4
 SURPRISE = 5.0  # standard deviations that one held-out row may count
-ENLARGED = 10.0  # BIC: noise beyond the declared one is an effect, and has to beat it as one
 SETTLED = 1e-3  # BIC
 
 
@@ -103,23 +102,20 @@ def fit_noise(
     Returns:
         The best of the turns; the order p is the one of least BIC.
     """
-    train, target = blocks.train, np.ascontiguousarray(target)
-    rows = np.ascontiguousarray(columns.T)
     ar = np.zeros(0) if start is None else start
-    best: tuple[float, FloatArray, FloatArray] | None = None
+    best: tuple[float, FloatArray, FloatArray, FloatArray] | None = None
     for _ in range(NOISE_FIT_ROUNDS):
-        beta = coefficients(whitened_block(rows, ar, train, 0.0), whitened_rows(target, ar, train))
-        residual = target - columns @ beta
-        fitted, score = best_autoregression(residual, train, MAX_ORDER)
+        beta, residual = _linear_part(target, columns, blocks.train, ar)
+        fitted, score = best_autoregression(residual, blocks.train, MAX_ORDER)
         if best is not None and score >= best[0] - SETTLED:
             break
-        best = (score, beta, fitted)
+        best = (score, beta, residual, fitted)
         if np.array_equal(fitted, ar):  # the next turn would be this one
             break
         ar = fitted
     assert best is not None
-    _, beta, ar = best
-    found = _result(target - columns @ beta, beta, ar, blocks, len(ar))
+    _, beta, residual, ar = best
+    found = _result(residual, beta, ar, blocks, len(ar))
     return found if len(ar) <= FIGURES else _remembering(target, columns, blocks, found)
 
 
@@ -160,7 +156,7 @@ def noise_forms(
     own = {b"" if start is None else start.tobytes(): start for start in starts}
     fits = [fit_noise(target, columns, blocks, start) for start in own.values()]
     if declared:
-        fits = [dataclasses.replace(fit, price=fit.price + ENLARGED, enlarged=True) for fit in fits]
+        fits = [dataclasses.replace(fit, price=fit.price + MARGIN, enlarged=True) for fit in fits]
         fits += [given_noise(target, columns, blocks, ar) for ar in declared]
     return fits
 
@@ -169,16 +165,21 @@ def given_noise(
     target: FloatArray, columns: FloatArray, blocks: Blocks, ar: FloatArray
 ) -> NoiseFit:
     """Fit the linear columns under noise whose φ are given, its spread left open."""
-    train, target = blocks.train, np.ascontiguousarray(target)
-    white = whitened_block(np.ascontiguousarray(columns.T), ar, train, VANISHED)
-    beta = coefficients(white, whitened_rows(target, ar, train))
-    residual = target - columns @ beta
+    beta, residual = _linear_part(target, columns, blocks.train, ar)
+    return _result(residual, beta, ar, blocks)
+
+
+def _linear_part(
+    target: FloatArray, columns: FloatArray, train: BoolArray, ar: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return β by whitened least squares of the fitted rows, and what it leaves, shape (N,)."""
+    white = whitened_block(np.ascontiguousarray(columns.T), ar, train, ROUNDING)
+    beta = coefficients(white, whitened_rows(np.ascontiguousarray(target), ar, train))
     unseen = ~white.any(axis=1)
     if unseen.any():  # the innovations do not show them, the free run does
         seen = np.ascontiguousarray(columns[train][:, unseen].T)
-        beta[unseen] = coefficients(seen, residual[train])
-        residual = target - columns @ beta
-    return _result(residual, beta, ar, blocks)
+        beta[unseen] = coefficients(seen, (target - columns @ beta)[train])
+    return beta, target - columns @ beta
 
 
 def _result(

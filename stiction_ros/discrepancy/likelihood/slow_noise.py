@@ -3,11 +3,11 @@
 import numpy as np
 
 from stiction_ros.compiled import compiled
+from stiction_ros.discrepancy.measures import GAUSS_NEWTON
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 REMEMBERED = 60  # samples that such a noise, or an OP off its record, is remembered
 NEGLIGIBLE = 0.01  # of φ
-ROUNDS = 20  # of Gauss-Newton
 MOST = 0.9999  # of either pole: a walk that goes on for ten thousand samples
 BEGUN = ((0.98, 0.5), (0.98, 0.9))  # from which it is looked for: the white part small, and large
 FIGURES = len(BEGUN[0])
@@ -45,7 +45,7 @@ def _searched(
     best, own, other = np.inf, keep, forget
     share = 1.0
     step = np.zeros(2)
-    for _ in range(ROUNDS):
+    for _ in range(GAUSS_NEWTON):
         left = total = 0.0
         slope, cross, gram = np.zeros(2), np.zeros(2), np.zeros((2, 2))
         for k in range(1, len(residual)):

@@ -4,7 +4,8 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from stiction_ros.compiled import compiled
-from stiction_ros.discrepancy.likelihood.least_squares import VANISHED, coefficients
+from stiction_ros.discrepancy.likelihood.least_squares import coefficients
+from stiction_ros.discrepancy.measures import ROUNDING
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 STEADY = 1e-13  # of a gain and of a variance: what changes less from row to row stays
@@ -120,5 +121,5 @@ def left_by_columns(white: FloatArray, values: FloatArray, rows: BoolArray) -> F
         rows: shape (N,).
     """
     after, before = (np.linalg.norm(each[1:, rows], axis=1) for each in (white, values))
-    columns = white[1:][after > VANISHED * before]
+    columns = white[1:][after > ROUNDING * before]
     return np.asarray(white[0] - coefficients(columns[:, rows], white[0, rows]) @ columns)

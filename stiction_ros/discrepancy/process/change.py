@@ -14,8 +14,8 @@ from stiction_ros.discrepancy.decision.explanation import (
     run_with,
 )
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap_options import MARGIN
 from stiction_ros.discrepancy.likelihood.least_squares import left_by
+from stiction_ros.discrepancy.measures import GAUSS_NEWTON, MARGIN, NORMAL, ROUNDING
 from stiction_ros.discrepancy.process.free_equation import Equation
 from stiction_ros.discrepancy.process.refit import equations_of, process_with, with_equations
 from stiction_ros.discrepancy.process.slower import GAIN, Changeable
@@ -26,11 +26,8 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.processes import ArxProcess
 from stiction_ros.signals.autoregression import whiten
 
-STEPS = 20
 TINY_STEP = 0.02  # of the probes, at which it has settled
 SURE = 2.5  # standard errors by which a figure has to be another than the model's
-NORMAL = 1.96
-NOTHING = 1e-9  # of what is left, that a unit of a figure moves: nothing is known of it
 PROBE, LARGEST_STEP = 0.02, 0.5  # of an effect's figure: probe of its derivative, longest step
 NEAR = 0.99  # of the largest change, from which on a figure lies on its bound
 Tried = tuple[float, BoolArray, FloatArray, FloatArray, tuple[AddedEffect, ...]]
@@ -151,7 +148,7 @@ class _Search:
     def _settle(self) -> None:
         output, free = self.output, self.free
         least, moved = np.inf, np.zeros(len(free))
-        for _ in range(STEPS):
+        for _ in range(GAUSS_NEWTON):
             run = self._run(self.values)
             base = Baseline.of(run, columns=open_columns(run, self.effects))
             noise, train = base.noise[output], base.blocks[output].train
@@ -171,13 +168,13 @@ class _Search:
             left = target + white @ step
             variance = float(left @ left) / max(len(left) - len(step), 1)
             spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(white.T @ white)) * variance, 0.0))
-            seen = np.linalg.norm(white, axis=0) > NOTHING * np.linalg.norm(target)
+            seen = np.linalg.norm(white, axis=0) > ROUNDING * np.linalg.norm(target)
             count = int(free.sum())
             self.errors[free] = np.where(seen, spread, np.inf)[:count]
             moved = np.zeros(len(free))
             room = 0.5 * np.where(step[:count] < 0.0, -self.least[free], self.most[free])
             own = np.where(room > 0.0, step[:count], 0.0)
-            moved[free] = own / max(float(np.max(np.abs(own) / np.maximum(room, NOTHING))), 1.0)
+            moved[free] = own / max(float(np.max(np.abs(own) / np.maximum(room, ROUNDING))), 1.0)
             moved = np.clip(self.values + moved, self.least, self.most) - self.values
             self.values = self.values + moved
             more = np.clip(step[count:], -LARGEST_STEP, LARGEST_STEP).tolist()

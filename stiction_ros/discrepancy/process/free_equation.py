@@ -15,7 +15,6 @@ from stiction_ros.signals.polynomials import largest_root, stabilised
 RADIUS = 0.9995
 LARGEST_START = 0.995
 PREFILTERINGS = 3
-LARGEST = 1e3  # of the span of PV: what a free run may reach
 LEAST_GAIN = 0.1
 SHARES = (1.0, 0.4, 0.1)  # of a Gauss-Newton step
 
@@ -118,12 +117,6 @@ class Problem:
         total = sum(c @ b for c, b in zip(self.inputs(equation), equation.b, strict=True))
         return self.each(np.asarray(total), np.ones(1), equation.denominator)
 
-    def bounded(self, equation: Equation) -> bool:
-        """Tell whether an equation is stable and its free run no larger than PV by orders."""
-        if not equation.stable:
-            return False
-        return float(np.ptp(self.forced(equation))) < LARGEST * float(np.ptp(self.y))
-
     def fit(self, equation: Equation, like: FloatArray | None = None) -> Fitted:
         """Return the noise behind an equation; ``like`` is φ to begin with."""
         gap = self.y - self.forced(equation)
@@ -150,7 +143,7 @@ def best_fit(problem: Problem, starts: Sequence[Equation], rounds: int) -> Fitte
 
     The likelihood is that of the innovations on the fitted rows. None where no start is stable.
     """
-    fitted = [problem.fit(start) for start in starts if problem.bounded(start)]
+    fitted = [problem.fit(start) for start in starts if start.stable]
     if not fitted:
         return None
     best = min(fitted, key=lambda each: each.bic)
@@ -183,7 +176,7 @@ def _line_search(
 ) -> Fitted | None:
     for share in SHARES:
         tried = now.equation.moved(share * steps[0])
-        if not problem.bounded(tried):
+        if not tried.stable:
             continue
         found = problem.fit(tried, now.noise.ar + share * steps[1])
         if found.bic < now.bic:

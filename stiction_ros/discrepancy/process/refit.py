@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
 from stiction_ros.discrepancy.process.free_equation import (
     Equation,
     Fitted,
@@ -20,7 +21,6 @@ from stiction_ros.processes import AlteredProcess, ArxProcess, Process
 
 LATER = 1  # samples beyond the model's own delays that are tried
 REFIT_ROUNDS = 8
-SETTLING = 6  # rows that the noise model of highest order reaches back
 
 
 def longest_delay(model: LoopModel) -> int:
@@ -90,7 +90,7 @@ def with_common_rows(runs: Runs, model: LoopModel) -> Runs:
     reach = longest_delay(model) + 2 + max(len(b) for e in equations for b in e.b)
     usable = runs.usable.copy()
     for rows in runs.slices:
-        usable[:, rows.start : min(rows.start + reach + SETTLING, rows.stop)] = False
+        usable[:, rows.start : min(rows.start + reach + MAX_ORDER, rows.stop)] = False
     return dataclasses.replace(runs, usable=usable)
 
 

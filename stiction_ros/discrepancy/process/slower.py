@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from stiction_ros.discrepancy.measures import ROUNDING
 from stiction_ros.discrepancy.process.free_equation import Equation
 from stiction_ros.effects import FloatArray
 
 FRACTIONS = 41  # of a sample, at which the dead time's is looked for
 EXACT = 1e-6  # of b, that the continuous plant may miss
-NOTHING = 1e-9
 SLIGHT = 1e-5  # of the largest power of s in a numerator, that is rounding
 
 ComplexArray = NDArray[np.complex128]
@@ -43,11 +43,11 @@ def held(denominator: FloatArray, b: FloatArray) -> Held | None:
     """
     roots = np.roots(denominator).astype(complex)
     count = len(roots)
-    if not count or len(b) > count + 1 or np.any(np.abs(roots) < NOTHING):
+    if not count or len(b) > count + 1 or np.any(np.abs(roots) < ROUNDING):
         return None
-    if np.any((roots.real < 0.0) & (np.abs(roots.imag) < NOTHING)):
+    if np.any((roots.real < 0.0) & (np.abs(roots.imag) < ROUNDING)):
         return None
-    poles = np.log(np.where(np.abs(roots - 1.0) < NOTHING, 1.0, roots))
+    poles = np.log(np.where(np.abs(roots - 1.0) < ROUNDING, 1.0, roots))
     wanted = np.concatenate([b, np.zeros(count + 1 - len(b))])
 
     def left(fraction: float) -> float:
@@ -102,7 +102,7 @@ def _answers(poles: ComplexArray, fraction: float) -> FloatArray:
 
 def later(plant: Held, samples: float) -> tuple[Held, int]:
     """Return the plant with more dead time, and the whole samples that it passes."""
-    whole = math.floor(plant.fraction + samples + NOTHING)
+    whole = math.floor(plant.fraction + samples + ROUNDING)
     fraction = min(max(plant.fraction + samples - whole, 0.0), 1.0)
     return dataclasses.replace(plant, fraction=fraction), whole
 
@@ -116,7 +116,7 @@ def slower(plant: Held, stretches: FloatArray, led: FloatArray) -> Held:
         led: factor of every zero's, in the order of :func:`zeros_of`.
     """
     poles = plant.poles / stretches
-    moved = np.abs(plant.poles) > NOTHING
+    moved = np.abs(plant.poles) > ROUNDING
     level = float(np.real(np.prod(poles[moved] / plant.poles[moved])))
     highest = _trimmed(plant.numerator)[-1]
     other = highest * np.prod(led) * np.real(np.poly(zeros_of(plant) / led))
@@ -181,7 +181,7 @@ class Changeable:
         known = all(plant is not None or not len(b) for plant, b in zip(plants, own.b, strict=True))
         self._plants: list[Held | None] | None = plants if known else None
         self._poles = np.roots(own.denominator).astype(complex)
-        whole = np.where(np.abs(self._poles) < NOTHING, NOTHING, self._poles)
+        whole = np.where(np.abs(self._poles) < ROUNDING, ROUNDING, self._poles)
         least = 1.0 / (1.0 + MOST[GAIN]) - 1.0
         self.figures = [
             Figure(GAIN, least, MOST[GAIN]),
@@ -252,11 +252,11 @@ def _of_roots(roots: ComplexArray, what: str, valve: int | None) -> list[Figure]
     for k, root in enumerate(roots.tolist()):
         pace = abs(root)
         swings = abs(root.imag)
-        if root.imag < -NOTHING or not NOTHING < pace <= 1.0 / SHORTEST:
+        if root.imag < -ROUNDING or not ROUNDING < pace <= 1.0 / SHORTEST:
             continue  # one of a pair stands for both
         pair: tuple[int, ...] = (k,)
-        if swings > NOTHING:
-            pair = tuple(np.flatnonzero(np.abs(roots - root.conjugate()) < NOTHING).tolist())
+        if swings > ROUNDING:
+            pair = tuple(np.flatnonzero(np.abs(roots - root.conjugate()) < ROUNDING).tolist())
             pair = (k, *pair)
         found.append(Figure(what, min(GONE * pace, 1.0) - 1.0, MOST[what], pair, valve, 1.0 / pace))
     return found

@@ -13,14 +13,13 @@ from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap_options import GapOptions
 from stiction_ros.discrepancy.likelihood.noise import SURPRISE
+from stiction_ros.discrepancy.measures import NEARLY_ALL
 from stiction_ros.discrepancy.process.first_model import liveliest_parts
 from stiction_ros.discrepancy.simulation.free_run import PHASES, FreeRun, Runs, moves_on
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
-
-MOST = 0.9  # of what is beyond chance, that the quarter of the rows that is kept back may hold
 
 
 def begin(
@@ -39,7 +38,7 @@ def begin(
     data = (*((found,) if found else ()), *gate.findings)
     runs = dataclasses.replace(
         corrected(runs, found),
-        op=controller.op(runs),
+        op=runs.op if controller.scans is None else controller.scans.op,
         scans=None if controller.scans is None else controller.scans.each(runs.op),
         unseen=unseen_of(runs, controller),
         between=() if options.process_fitted else _between(model),
@@ -122,7 +121,7 @@ def with_surprises_fitted(base: Baseline) -> Runs:
     for r, (rows, usual) in enumerate(zip(runs.slices, runs.phases, strict=True)):
         part = beyond[rows]
         kept = {phase: float(part[runs.kept_back(r, phase)].sum()) for phase in PHASES}
-        most = kept[usual] > MOST * float(part.sum())
+        most = kept[usual] > NEARLY_ALL * float(part.sum())
         phases.append(min(kept, key=kept.__getitem__) if most else usual)
     if tuple(phases) == runs.phases:
         return runs

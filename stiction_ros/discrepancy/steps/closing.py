@@ -12,7 +12,6 @@ from stiction_ros.discrepancy.answer.found_effects import (
     of_data,
     of_noise,
     own_closed,
-    units_of,
     without_its_jump,
 )
 from stiction_ros.discrepancy.answer.results import Discrepancy
@@ -24,8 +23,7 @@ from stiction_ros.discrepancy.answer.say import (
     overall,
     reason_for,
 )
-from stiction_ros.discrepancy.candidate.base import figures_of
-from stiction_ros.discrepancy.decision.decide import SURE, GapVerdict, on_the_way, verdict_of
+from stiction_ros.discrepancy.decision.decide import GapVerdict, on_the_way, verdict_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.fit.uncertainty import (
@@ -44,18 +42,18 @@ from stiction_ros.discrepancy.gap.measure import (
 )
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
+from stiction_ros.discrepancy.measures import SURE
 from stiction_ros.discrepancy.process.refit import open_figures
 from stiction_ros.discrepancy.steps.look import MOVED_AWAY, explained
 from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import with_laws
-from stiction_ros.effects import FloatArray, from_mapping
+from stiction_ros.effects import FloatArray
 from stiction_ros.signals.autoregression import gain_of_noise
 
-BESIDE = 0.2  # of the first gap, that is left as noise: less is no effect beside another one
 A_ROW = 0.1  # of −2 log likelihood, that noise gains beside an effect: a twentieth of its σ
 DROWNED = 4.0  # times the declared noise: more is none that thinned values add to it
-CLOSES = 0.2  # of the excess of the free run that an effect has to close by itself
+MATTERS = 0.2  # of the gap, that an effect has to close by itself, and a noise that is left to be
 
 
 def closing(task: Task, looked: State) -> Discrepancy:
@@ -74,8 +72,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
     for named, added in zip(found, state.now.effects, strict=True):
         model = model.with_effect(added.place, added.behaviour, **_provenance(task, named))
     for noise in louder:
-        behaviour = from_mapping({"effect": noise.effect} | dict(noise.parameters))
-        model = model.with_effect(noise.place, behaviour, **_provenance(task, noise))
+        model = model.with_effect(noise.place, noise.behaviour, **_provenance(task, noise))
     noises = check_noise(state.now.base)
     kept = {e.fit.candidate.key for e in state.now.effects}
     no_names = [
@@ -157,7 +154,7 @@ def _named(task: Task, state: State) -> tuple[State, list[FoundEffect]]:
         no_name = [
             k
             for k, (shown, effect) in enumerate(zip(found, state.now.effects, strict=True))
-            if holds_nothing_out(effect, state.now.base, shown.intervals) or shown.closed < CLOSES
+            if holds_nothing_out(effect, state.now.base, shown.intervals) or shown.closed < MATTERS
         ]
         if not no_name:
             return state, found
@@ -179,20 +176,14 @@ def _found(task: Task, state: State) -> list[FoundEffect]:
     for k, effect in enumerate(now.effects):
         others = [*moved[:k], *moved[k + 1 :], *slopes]
         beside = [np.hstack(columns) for columns in zip(*others, strict=True)]
+        fitted = task.options.process_fitted
+        dated = effect.fit.candidate.dated
         told = FoundEffect(
             effect.place,
-            effect.effect,
-            effect.behaviour.law,
-            figures_of(effect.behaviour),
-            units_of(effect.behaviour, effect.place),
-            _intervals(task, state, k, without[k], beside),
+            effect.behaviour,
             effect.fit.delta_bic,
-            own_closed(
-                without[k],
-                now.base,
-                dated=effect.fit.candidate.dated,
-                given=not task.options.process_fitted,
-            ),
+            _intervals(task, state, k, without[k], beside),
+            own_closed(without[k], now.base, dated=dated, given=not fitted),
             verdict_of(effect.effect, effect.alternatives),
             effect.alternatives,
             reason_for(effect, state.looks),
@@ -309,7 +300,7 @@ def _matters(state: State, output: int) -> bool:
     )
     if not spans_steps(now.base, output):
         return False
-    return not (now.effects or now.changes) or after > BESIDE * before
+    return not (now.effects or now.changes) or after > MATTERS * before
 
 
 def _provenance(task: Task, effect: FoundEffect) -> dict[str, object]:

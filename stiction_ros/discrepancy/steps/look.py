@@ -38,12 +38,12 @@ from stiction_ros.discrepancy.decision.scores import (
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.gap.where import locate
+from stiction_ros.discrepancy.measures import TURNS
 from stiction_ros.discrepancy.process.refit import open_figures, refitted_behind
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import changed_again, process_first
 
-TURNS = 2  # in which a fitted process and the effects before it are fitted again
 SCORED = 0.8  # of the time of a look
 MANY = 0.2  # of the values, that were held or interpolated
 MOST_THINNED = 0.95  # of the values

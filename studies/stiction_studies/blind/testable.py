@@ -6,7 +6,7 @@ from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.decision.scores import all_candidates
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import fit_candidate
-from stiction_ros.discrepancy.gap_options import MARGIN
+from stiction_ros.discrepancy.measures import MARGIN
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_studies.blind.loops.generator import BlindLoop
 from stiction_studies.blind.loops.truth import Hidden, Truth

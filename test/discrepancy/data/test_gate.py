@@ -8,21 +8,21 @@ from gap_loops import loop, record, without_controller
 
 from stiction_ros.discrepancy import GapOptions, find_discrepancy
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus, check_controller
-from stiction_ros.discrepancy.data.gate import Gate, look_at_data, open_gate, quantum_of
-from stiction_ros.discrepancy.simulation.free_run import join_records
+from stiction_ros.discrepancy.data.gate import Gate, open_gate, quantum_of
+from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, Freeze, Quantisation, TimeShift, Tuning
 from stiction_ros.loop import PiTuning
 from stiction_studies.blind.loops.generator import blind_loop
 
 
-def gate_of(effect: Behaviour | None) -> Gate:
+def opened(effect: Behaviour | None) -> tuple[Runs, Gate]:
     model = loop()
     true = model if effect is None else model.with_effect("sensor:PV1", effect)
-    return look_at_data(model, join_records(model, [record(true)]))
+    return open_gate(model, [record(true)])
 
 
 def test_sound_data_show_nothing() -> None:
-    assert gate_of(None).findings == ()
+    assert opened(None)[1].findings == ()
 
 
 @pytest.mark.parametrize(
@@ -34,19 +34,20 @@ def test_sound_data_show_nothing() -> None:
     ],
 )
 def test_sensor_effects_are_seen_in_the_values(effect: Behaviour, name: str) -> None:
-    assert [finding.effect for finding in gate_of(effect).findings] == [name]
+    assert [finding.effect for finding in opened(effect)[1].findings] == [name]
 
 
 @pytest.mark.parametrize("effect", [Freeze(300.0, 60.0), Clip(44.0, 56.0), Quantisation(0.5)])
 def test_what_the_model_has_already_is_no_finding(effect: Behaviour) -> None:
     model = loop().with_effect("sensor:PV1", effect)
-    gate = look_at_data(model, join_records(model, [record(model)]))
+    runs, gate = open_gate(model, [record(model)])
+    plain, _ = opened(effect)
     assert gate.findings == ()
     # Its rows stay out of the scores all the same.
-    assert gate.usable.tolist() == gate_of(effect).usable.tolist()
+    assert runs.usable.tolist() == plain.usable.tolist()
     # Rounded values count as rounded, whoever named the rounding.
-    assert gate.rounding == gate_of(effect).rounding
-    assert (gate.rounding == (0.5,)) == isinstance(effect, Quantisation)
+    assert runs.quanta == plain.quanta
+    assert (runs.quanta == (0.5,)) == isinstance(effect, Quantisation)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +63,7 @@ def test_what_the_model_has_with_other_figures_is_a_finding(
 ) -> None:
     model = loop().with_effect("sensor:PV1", known)
     shown = record(loop().with_effect("sensor:PV1", true))
-    found = look_at_data(model, join_records(model, [shown])).findings
+    found = open_gate(model, [shown])[1].findings
     assert [finding.effect for finding in found] == [true.effect]
 
 
@@ -74,7 +75,7 @@ def test_an_effect_of_the_gate_is_not_added_twice() -> None:
 
 
 def test_a_frozen_while_is_timed() -> None:
-    (finding,) = gate_of(Freeze(300.0, 60.0)).findings
+    (finding,) = opened(Freeze(300.0, 60.0))[1].findings
     behaviour = finding.behaviour
     assert isinstance(behaviour, Freeze)
     assert (behaviour.onset, behaviour.duration) == pytest.approx((300.0, 60.0), abs=1.0)
@@ -89,9 +90,9 @@ def test_a_rest_at_the_end_of_all_values_was_frozen_where_it_leaps_away(leaps: b
     pv[300:340] = top
     if not leaps:
         pv[340:380, 0] = np.linspace(top, pv[380, 0], 41)[1:]
-    gate = look_at_data(model, join_records(model, [dataclasses.replace(sound, pv=pv)]))
+    runs, gate = open_gate(model, [dataclasses.replace(sound, pv=pv)])
     assert [finding.effect for finding in gate.findings] == ["freeze" if leaps else "clip"]
-    assert not gate.usable[0, 302:338].any()
+    assert not runs.usable[0, 302:338].any()
 
 
 @pytest.mark.parametrize("rows", [slice(0, 50), slice(200, 250), slice(-50, None)])
@@ -99,7 +100,7 @@ def test_a_sensor_that_fails_to_its_end_was_frozen_wherever_in_the_record(rows: 
     model, sound = loop(), record(loop())
     pv = sound.pv.copy()
     pv[rows] = pv.max() + 5.0
-    gate = look_at_data(model, join_records(model, [dataclasses.replace(sound, pv=pv)]))
+    _, gate = open_gate(model, [dataclasses.replace(sound, pv=pv)])
     assert [finding.effect for finding in gate.findings] == ["freeze"]
 
 
@@ -132,12 +133,12 @@ def test_a_pv_that_never_moves_is_said() -> None:
 
 
 def test_frozen_rows_are_not_scored() -> None:
-    usable = gate_of(Freeze(300.0, 60.0)).usable
+    usable = opened(Freeze(300.0, 60.0))[0].usable
     assert not usable[0, 302:358].any()
 
 
 def test_ends_of_a_sensor_are_found() -> None:
-    (finding,) = gate_of(Clip(44.0, 56.0)).findings
+    (finding,) = opened(Clip(44.0, 56.0))[1].findings
     assert isinstance(finding.behaviour, Clip)
     assert finding.behaviour.high == 56.0
 
@@ -291,5 +292,5 @@ def test_samples_that_stand_alone_are_not_scored(count: int) -> None:
     model, recorded = loop(), record(loop())
     pv = recorded.pv.copy()
     pv[300 : 300 + count, 0] += 9.0
-    gate = look_at_data(model, join_records(model, [dataclasses.replace(recorded, pv=pv)]))
-    assert np.flatnonzero(~gate.usable[0]).tolist() == list(range(300, 300 + count))
+    runs, _ = open_gate(model, [dataclasses.replace(recorded, pv=pv)])
+    assert np.flatnonzero(~runs.usable[0]).tolist() == list(range(300, 300 + count))

@@ -331,7 +331,7 @@ def test_a_walk_behind_thinned_values_is_not_nothing() -> None:
 def test_values_between_kept_ones_are_no_evidence() -> None:
     kept = answered(315)  # a gain, three values of four between kept ones
     assert names(kept) == [("process:PV1", "gain")]
-    assert 0.6 < np.mean(kept.gate.filled) < 0.8
+    assert 0.6 < np.mean(kept.runs.filled) < 0.8
     assert answered(828).verdict is GapVerdict.NONE  # healthy
 
 

@@ -1,0 +1,10 @@
+"""Measures that all steps share: what gains enough, what is most of a thing, what is rounding."""
+
+MARGIN = 10.0  # BIC by which an effect must beat no effect and its best rival
+SURE = 2.0 * MARGIN  # BIC beyond that, from which on there is a gap even where no name holds
+MAJORITY = 0.5  # of a thing: more is most of it
+NEARLY_ALL = 0.9  # of a thing
+NORMAL = 1.96  # standard errors on either side that hold 95 %
+ROUNDING = 1e-9  # of a size: less is none
+GAUSS_NEWTON = 20  # steps of a search that has not settled before
+TURNS = 2  # in which effects, and a process that is fitted with them, are fitted again
