@@ -112,7 +112,6 @@ class FitStatus(enum.StrEnum):
     """How the identification ended; everything but ``OK`` is a failure as a value."""
 
     OK = "ok"
-    NOT_CONVERGED = "not_converged"
     NO_MODEL = "no_model"
 
 

@@ -55,7 +55,7 @@ class InputPort:
         self._dv: FloatArray | None = None
         self._missed: dict[int, bool] = {}  # numbers of samples whose PV may still come
         self._seen: dict[str, float] = {}
-        self._begun = self._anew = False
+        self._begun = False
         self._waiting = self._behind = 0
         self._pv_number, self._pv_now, self._blind_from = -1, 0.0, 0.0
         self._taken_at, self._in_time = 0.0, True

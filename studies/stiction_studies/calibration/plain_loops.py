@@ -179,7 +179,7 @@ class _Valve:
     def __init__(self, law: str, static: float, dynamic: float) -> None:
         self.law, self.static, self.dynamic = law, static, dynamic
         self.stem = self.speed = self.pressure = 0.0
-        self.before, self.way, self.at, self.sticks, self.wayed = 0.0, 1.0, 0.0, True, 0.0
+        self.before, self.way, self.at, self.sticks = 0.0, 1.0, 0.0, True
 
     def follow(self, op: float) -> float:
         if self.law == "none":

@@ -51,8 +51,7 @@ class PlantHand:
             found = await node_ids(client, list(new.values()))
             nodes = {name: found[tag] for name, tag in new.items()}
             for tag, node in nodes.items():
-                kind = await client.get_node(node).read_data_type_as_variant_type()
-                self._kinds[tag] = kind
+                self._kinds[tag] = await client.get_node(node).read_data_type_as_variant_type()
             self._nodes |= nodes
         for name, value in values.items():
             told = ua.DataValue(ua.Variant(value, self._kinds[name]))

@@ -33,33 +33,24 @@ ROOM = 12.0  # % of the valve: how far PV may go
 
 @dataclasses.dataclass(frozen=True)
 class Ended:
-    """One valve and how its test ended.
+    """One valve and how its test ended."""
 
-    Attributes:
-        seed, kind, plant, law, f_s, circumstances: of the valve.
-        verdict, probability, interval: of the last judgement; undecided where PV met its limit
-            before the second move.
-        moves: that were made.
-        duration: in times of dead time and lag together.
-        beyond: of PV's limit, in standard deviations of the noise.
-        seconds: of a judgement.
-        ended: why the test ended.
-    """
-
-    seed: int
+    seed: int  # seed to circumstances: of the valve
     kind: str
     plant: str
     law: str
     f_s: float
     circumstances: tuple[str, ...]
+    # verdict, probability, interval: of the last judgement; undecided where PV met its limit before
+    # the second move
     verdict: str
     probability: float
     interval: tuple[float, float]
-    moves: int
-    duration: float
-    beyond: float
-    seconds: float
-    ended: str
+    moves: int  # that were made
+    duration: float  # in times of dead time and lag together
+    beyond: float  # of PV's limit, in standard deviations of the noise
+    seconds: float  # of a judgement
+    ended: str  # why the test ended
 
     @property
     def sticks(self) -> bool:
