@@ -42,6 +42,11 @@ def add(commands: Any) -> None:
         metavar="FILE",
         help="the loop model, then records (CSV files or bags); records alone with --fit-linear",
     )
+    parser.add_argument(
+        "--after",
+        metavar="FILE",
+        help="a record of the experiment that the answer named; both together decide",
+    )
     intake.add_columns(parser)
     intake.add_intake(parser)
     parser.add_argument(
@@ -71,6 +76,7 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    options.inputs += [options.after] if options.after else []
     model, records = _inputs(options)
     from stiction_ros.discrepancy import GapOptions, find_discrepancy
 
@@ -126,7 +132,7 @@ def _write(found: "Discrepancy", directory: Path) -> None:
 
 
 def _again(options: argparse.Namespace) -> str:
-    """Return the command with what it was given, to which a further record may be added."""
+    """Return the command with what it was given, to which the record of an experiment may be added."""
     given = [*(["--fit-linear"] if options.fit_linear else []), *options.inputs]
     return shlex.join(["stiction", "gap", *given])
 
@@ -172,7 +178,7 @@ def _print(found: "Discrepancy", command: str) -> None:
     if found.experiment:
         console.print(f"to learn more: {found.experiment}", markup=False)
         if found.alternatives:
-            console.print(f"then with both records: {command} NEXT_RECORD", markup=False)
+            console.print(f"then with both records: {command} --after NEXT_RECORD", markup=False)
     if found.untestable:
         listed = ", ".join(called(t.place, t.effect) for t in found.untestable)
         console.print(f"not testable here: {listed}", markup=False)

@@ -80,6 +80,14 @@ def test_a_model_in_the_place_of_a_record_is_told(
     assert said in capsys.readouterr().err
 
 
+def test_the_record_of_the_experiment_is_read_with_the_others(
+    files: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [str(files / "model.loop.yaml"), str(files / "healthy.csv")]
+    assert main(["gap", *given, "--after", "after.csv"]) == 2
+    assert "after.csv: no such file" in capsys.readouterr().err
+
+
 @pytest.mark.trial
 def test_a_model_that_comes_along_is_found_by_its_name(
     files: Path, capsys: pytest.CaptureFixture[str]
