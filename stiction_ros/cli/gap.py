@@ -132,7 +132,7 @@ def _write(found: "Discrepancy", directory: Path) -> None:
 
 
 def _again(options: argparse.Namespace) -> str:
-    """Return the command with what it was given, to which the record of an experiment may be added."""
+    """Return the command with what it was given, to which a further record may be added."""
     given = [*(["--fit-linear"] if options.fit_linear else []), *options.inputs]
     return shlex.join(["stiction", "gap", *given])
 

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 from graph import KINDS, Graph
-from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
 from stiction_ros.nodes.shared.managed import ManagedNode
@@ -181,10 +180,13 @@ def test_at_rest_a_node_takes_all_that_it_reads_when_it_is_configured(
         assert answer.successful != entry.once, answer.reason
 
 
-def test_an_unknown_parameter_is_refused(graph: Graph) -> None:
-    node = graph.add("plant")
-    with pytest.raises(ParameterNotDeclaredException):
-        ask(node, "wnidow", 3)
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_an_unknown_parameter_is_named_beside_those_that_are_known(kind: str, graph: Graph) -> None:
+    node = graph.add(kind)
+    answer = ask(node, "wnidow", 3)
+    assert not answer.successful
+    assert answer.reason.startswith(f"{kind}: unknown parameter 'wnidow'; known: ")
+    assert all(entry.name in answer.reason for entry in settings_of(node.settings_class))
 
 
 def test_after_clean_up_another_value_is_in_force(graph: Graph, tmp_path: Path) -> None:

@@ -7,7 +7,6 @@ from typing import Any
 
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -298,6 +297,15 @@ class ManagedNode(LifecycleNode):
     def retune(self, settings: Any) -> None:
         """React to changed settings; InputError refuses them."""
 
+    def set_parameters_atomically(self, parameter_list: list[Any]) -> Any:
+        """Set parameters as ROS does, but say which one is unknown."""
+        try:
+            for parameter in parameter_list:
+                parameters.check_known(self, parameter.name)
+        except InputError as error:
+            return parameters.refusal(error)
+        return super().set_parameters_atomically(parameter_list)
+
     def _on_set(self, wanted: list[Any]) -> Any:
         values = {p.name: p.value for p in wanted}
         try:
@@ -306,9 +314,9 @@ class ManagedNode(LifecycleNode):
             if self._configured and settings is not self.settings:
                 self.retune(settings)
         except InputError as error:
-            return SetParametersResult(successful=False, reason=str(error))
+            return parameters.refusal(error)
         self.settings = settings
-        return SetParametersResult(successful=True)
+        return parameters.accepted()
 
     # ---- diagnostics -----------------------------------------------------------------------
 

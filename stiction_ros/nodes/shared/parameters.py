@@ -4,7 +4,12 @@ import dataclasses
 import math
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -48,11 +53,27 @@ def refuse_unknown(node: Node) -> None:
     rclpy itself passes over it without a word.
     """
     for name in node._parameter_overrides:  # there is no public way to these names
-        if not name.startswith("qos_overrides.") and not node.has_parameter(name):
-            known = ", ".join(sorted(node.get_parameters_by_prefix("")))
-            raise InputError(
-                f"unknown parameter {name!r}", where=node.get_name(), fix=f"known: {known}"
-            )
+        if not name.startswith("qos_overrides."):
+            check_known(node, name)
+
+
+def check_known(node: Node, name: str) -> None:
+    """Raise InputError where ``node`` has no parameter ``name``."""
+    if not node.has_parameter(name):
+        known = ", ".join(sorted(node.get_parameters_by_prefix("")))
+        raise InputError(
+            f"unknown parameter {name!r}", where=node.get_name(), fix=f"known: {known}"
+        )
+
+
+def refusal(error: InputError) -> SetParametersResult:
+    """Return the answer that leaves the old value in force."""
+    return SetParametersResult(successful=False, reason=str(error))
+
+
+def accepted() -> SetParametersResult:
+    """Return the answer that takes the new values."""
+    return SetParametersResult(successful=True)
 
 
 def as_mapping(settings: Any) -> dict[str, Any]:
