@@ -56,7 +56,7 @@ def facts_before(record: Record, found: Identification, limits: Limits) -> Facts
     left = record.pv[:, 0] - model.free_run({valve.name: found.stem[:, 0]}, record.pv[:, 0])
     if not np.isfinite(left).all():  # a level: PV bounds what it does by itself
         left = record.pv[:, 0]
-    facts = facts_of_answer(answer, left, valve.name, float(record.op[-1, 0]), 0.0)
+    facts = facts_of_answer(answer, valve.name, float(record.op[-1, 0]), 0.0, left)
     pv = float(record.pv[-round(facts.hold / step) :, 0].mean())
     reach = max(2.0 * valve.static_interval[1], WIDENS**2 * SMALLEST)
     room = float(np.abs(record.pv[:, 0] - pv).max()) + reach * abs(facts.gain or 0.0)
@@ -65,7 +65,7 @@ def facts_before(record: Record, found: Identification, limits: Limits) -> Facts
 
 
 def facts_of_answer(
-    answer: StepAnswer, left: FloatArray, valve: str, op: float, pv: float
+    answer: StepAnswer, valve: str, op: float, pv: float, left: FloatArray | None = None
 ) -> Facts:
     """Return what the answer to a step tells, without limits.
 
@@ -74,9 +74,9 @@ def facts_of_answer(
 
     Args:
         answer: of PV to 1 % of stem.
-        left: what it leaves of PV in a record, shape (N,).
         valve: tag.
         op, pv: where the test begins, % and engineering units.
+        left: what the answer leaves of PV in a record, shape (N,); None: white noise.
     """
     step, known = answer.sample_time, len(answer.values)
     least, longest = SHORTEST + 1, max(known // 2, SHORTEST + 1)
@@ -90,7 +90,7 @@ def facts_of_answer(
     gain: float | None = None
     if np.isfinite(answer.values).all() and np.abs(answer.values).max() > 0.0:
         gain = float(answer.values[min(count, known - 1)]) or None
-    noise = noise_over(left, count)
+    noise = answer.noise / math.sqrt(count) if left is None else noise_over(left, count)
     everywhere = (-math.inf, math.inf)
     return Facts(valve, op, pv, gain, noise, answer.dead_time, count * step, math.inf, everywhere)
 

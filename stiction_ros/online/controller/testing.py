@@ -127,8 +127,7 @@ class ValveTestingController(LiveController):
         from stiction_ros.online.controller.valve_test import ValveTest
 
         step, values = self.model.sample_time, self._answers.result()
-        past = self._past.history()
-        noise = _noise(past.pv)
+        noise = self._noise()
         clear = np.abs(values[:, :, self._valve]).max(axis=0) / np.maximum(noise, 1e-300)
         out = self.model.outputs.index(shows) if shows else int(np.argmax(clear))
         self._output = out
@@ -136,11 +135,7 @@ class ValveTestingController(LiveController):
             self.model.outputs[out], values[:, out, self._valve], float(noise[out]), step
         )
         begins = float(self._in_force[self._valve]), float(sp[out])
-        moves = np.diff(past.op[-LONGEST:], axis=0)
-        left = past.pv[-LONGEST:, out][1:]
-        for each, one in zip(moves.T, values[:, out].T, strict=True):
-            left -= np.convolve(each, one)[: len(each)]
-        facts = facts_of_answer(answer, left[np.isfinite(left)], names[self._valve], *begins)
+        facts = facts_of_answer(answer, names[self._valve], *begins)
         reach, room = self.settings.valve_test_op, self.settings.valve_test_pv
         room = room or abs(facts.gain or 0.0) * reach + float(np.abs(pv - sp)[out])
         middle = facts.pv
@@ -152,6 +147,12 @@ class ValveTestingController(LiveController):
             self._sample, ControlMode.VALVE_TEST, "a valve test begins", self._known.name
         )
         self.changes.append(begun)
+
+    def _noise(self) -> FloatArray:
+        """Return the standard deviation of the noise of each PV, shape (p,)."""
+        past = self._past.history().pv
+        news = np.diff(past[np.isfinite(past).all(axis=1)], axis=0)
+        return np.asarray(news.std(axis=0) / np.sqrt(2.0) if len(news) else np.zeros(past.shape[1]))
 
     def _stop(self, reason: str) -> None:
         if (test := self._running) is not None:
@@ -186,16 +187,6 @@ class ValveTestingController(LiveController):
         }
         model = dataclasses.replace(model, provenance=(*model.provenance, told))
         self.offer(model, self._sample + 1)
-
-
-def _noise(pv: FloatArray) -> FloatArray:
-    """Return the standard deviation of the noise of each PV, shape (p,), by its news.
-
-    Args:
-        pv: shape (N, p), NaN where it is not known.
-    """
-    news = np.diff(pv[np.isfinite(pv).all(axis=1)], axis=0)
-    return np.asarray(news.std(axis=0) / np.sqrt(2.0) if len(news) else np.zeros(pv.shape[1]))
 
 
 def _answers(model: LinearModel) -> FloatArray:
