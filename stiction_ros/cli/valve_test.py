@@ -32,9 +32,7 @@ def add(commands: Any) -> None:
     )
     option = parser.add_argument
     option("what", choices=("plan", "judge"), help="what to do")
-    option("record", metavar="RECORD|TEST", help="CSV file, other export, or bag")
-    intake.add_columns(parser)
-    intake.add_intake(parser)
+    intake.add_record(parser, metavar="RECORD|TEST")
     option("--before", metavar="RECORD", help="judge: the record that the test was planned from")
     option("--op-limit", type=float, metavar="X", help="how far OP may go from where it is, %%")
     option("--pv-limit", type=float, metavar="X", help="how far PV may go, in its own unit")
@@ -45,8 +43,6 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    if options.dry_run:
-        return intake.show_loops([Path(options.record)], intake.intake_options(options))
     limits = _limits(options)
     loop = intake.opened(options)
     intake.tell(loop)

@@ -1,7 +1,7 @@
-"""Measures that all steps share: what gains enough, what is most of a thing, what is rounding."""
+"""Limits that several steps share: of evidence, of shares, of rounding."""
 
 MARGIN = 10.0  # BIC by which an effect must beat no effect and its best rival
-SURE = 2.0 * MARGIN  # BIC beyond that, from which on there is a gap even where no name holds
+SURE = 2.0 * MARGIN  # BIC above the margin: there is a gap, even where no effect can be named
 MAJORITY = 0.5  # of a thing: more is most of it
 NEARLY_ALL = 0.9  # of a thing
 NORMAL = 1.96  # standard errors on either side that hold 95 %

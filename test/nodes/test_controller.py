@@ -1,7 +1,6 @@
 """The controller node among messages that come late, wrong, or not at all."""
 
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -23,13 +22,6 @@ S = 10**9
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 NAN = float("nan")
 KNOWN = find_config("example1.loop.yaml").read_text(encoding="utf-8")
-
-
-@pytest.fixture
-def graph() -> Iterator[Graph]:
-    built = Graph()
-    yield built
-    built.close()
 
 
 class Clock:

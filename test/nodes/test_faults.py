@@ -1,7 +1,7 @@
 """A few faults of ``stiction faults`` in one process: the run is what it is without them."""
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -39,13 +39,6 @@ def _quick_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five statuses a second, and conditions that are shown for half a second."""
     monkeypatch.setattr(managed, "LOOKS", 2)
     monkeypatch.setattr(managed, "Noticed", functools.partial(Noticed, shown=0.5))
-
-
-@pytest.fixture
-def graph() -> Iterator[Graph]:
-    built = Graph()
-    yield built
-    built.close()
 
 
 @functools.cache

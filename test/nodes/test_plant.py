@@ -2,7 +2,7 @@
 
 import functools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -24,13 +24,6 @@ def _quick_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(managed, "LOOKS", 2)
     monkeypatch.setattr(peers, "GRACE", 0.0)
     monkeypatch.setattr(managed, "Noticed", functools.partial(Noticed, shown=0.5))
-
-
-@pytest.fixture
-def graph() -> Iterator[Graph]:
-    built = Graph()
-    yield built
-    built.close()
 
 
 class Commander:

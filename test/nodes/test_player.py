@@ -1,7 +1,7 @@
 """The player: what was recorded comes out again, at any rate, under control."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,6 @@ from stiction_ros.records.bag.messages import read_messages, read_raw
 BAG = Path(__file__).parents[2] / "bags" / "sticky_siso"
 SIGNALS = {"/pv": JointState, "/op": JointState, "/stiction": JointState}
 FAST = 1e6
-
-
-@pytest.fixture
-def graph() -> Iterator[Graph]:
-    built = Graph()
-    yield built
-    built.close()
 
 
 class Stage:

@@ -1,12 +1,10 @@
 """The access control file allows what the nodes do, and no second commander."""
 
 import datetime
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import pytest
 import yaml
 from graph import Graph
 
@@ -15,13 +13,6 @@ from stiction_ros.config_files import find_config
 from stiction_ros.opcua.security import CLIENT_URI, Identity, make_certificate, write_secret
 
 NODES = (*STARTED, "opcua")
-
-
-@pytest.fixture
-def graph() -> Iterator[Graph]:
-    built = Graph()
-    yield built
-    built.close()
 
 
 def allowed(node: str, kind: str, right: str) -> set[str]:

@@ -10,7 +10,6 @@ from stiction_ros.nodes.recorder import topic_choice
 
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 
-from collections.abc import Iterator
 
 from as_given import run_metadata
 from graph import Graph
@@ -23,13 +22,6 @@ from stiction_ros.records.bag.messages import read_messages, read_raw
 from stiction_ros.records.storage.mcap_scan import McapScan
 
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-@pytest.fixture
-def graph() -> Iterator[Graph]:
-    built = Graph()
-    yield built
-    built.close()
 
 
 class Desk:

@@ -2,7 +2,6 @@
 
 import functools
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -31,13 +30,6 @@ def _quick_looks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five looks at the bag a second, and errors that are shown for a second."""
     monkeypatch.setattr(recorder_module, "BAG_PERIOD", 0.2)
     monkeypatch.setattr(managed_module, "Noticed", functools.partial(Noticed, shown=1.0))
-
-
-@pytest.fixture
-def graph() -> Iterator[Graph]:
-    built = Graph()
-    yield built
-    built.close()
 
 
 class Site:

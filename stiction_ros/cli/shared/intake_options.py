@@ -150,17 +150,13 @@ def opened(options: argparse.Namespace) -> Loop:
 
 
 def dry_run(options: argparse.Namespace) -> int:
-    """Print what would be read of all files that a command was given, but loop models."""
-    one = [options.record] if "record" in options else []
-    given = [*one, *getattr(options, "inputs", ()), *getattr(options, "paths", ())]
+    """Print what would be read from each record of a command; 1 when no loop can be read."""
+    one = (getattr(options, name, None) for name in ("record", "before", "after"))
+    given = [*filter(None, one), *getattr(options, "inputs", ()), *getattr(options, "paths", ())]
     paths = [Path(source) for source in given if not is_model(source)]
-    return show_loops(paths, intake_options(options))
-
-
-def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
-    """Print what would be read from where; 1 when no loop can be read."""
+    how = intake_options(options)
     readable = known = 0
-    for loop in loops(paths, options):
+    for loop in loops(paths, how):
         known += 1
         readable += loop.problem is None
         files = ", ".join(file.name for file in loop.files)
@@ -172,7 +168,7 @@ def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
             print(f"  note: {note}")
     print(f"{plural(known, 'loop')}, {readable} can be read" if known else "no file of a loop")
     if len(paths) > 1 or any(path.is_dir() for path in paths):
-        tell_strangers(options.tags, "export", strange_files(paths, options))
+        tell_strangers(options.tags, "export", strange_files(paths, how))
     return 0 if readable else 1
 
 

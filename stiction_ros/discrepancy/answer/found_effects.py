@@ -49,7 +49,7 @@ class FoundEffect:
 
     @property
     def effect(self) -> str:
-        """What it is, as loop models name it."""
+        """Name of the effect in a loop model."""
         return self.behaviour.effect
 
     @property

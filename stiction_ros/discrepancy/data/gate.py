@@ -39,13 +39,13 @@ class DataFinding:
 
     @property
     def effect(self) -> str:
-        """What it is, as loop models name it."""
+        """Name of the effect in a loop model."""
         return self.behaviour.effect
 
 
 @dataclasses.dataclass(frozen=True)
 class Gate:
-    """What the data themselves show."""
+    """Findings in the records, before anything is compared with the model."""
 
     # frozen, clipped and rounded PVs, but for what the model has already
     findings: tuple[DataFinding, ...]

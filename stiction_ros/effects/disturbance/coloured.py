@@ -15,7 +15,7 @@ class ColouredDisturbance(DrivenByNoise):
         w_k = \alpha w_{k-1} + \sigma \sqrt{1 - \alpha^2} \, n_k, \quad
         \alpha = e^{-T_s/\tau}, \; n_k \sim N(0, 1)
 
-    The plant draws n from a source of its own, so that the other noise stays what it was.
+    The plant draws n from a random source of its own. The other noise does not depend on it.
     """
 
     effect: ClassVar[str] = "coloured"

@@ -27,10 +27,10 @@ a border of rounding slowly, two when noise carries it over the next."""
 def held_rows(pv: FloatArray) -> BoolArray:
     """Return which rows repeat a value because PV was not read, shape (N,).
 
-    Where no value comes back, PV is not rounded, and all repeats are held, as by a sensor that
-    reports by exception. Else a run of repeats is held where it ends in a jump that rounding cannot
-    make, or where one hold a record is likelier than noise that stays within a step of rounding for
-    so long. The step is the least difference of any two values.
+    Where PV never returns to a value, PV is not rounded, and all repeats are held, as by a sensor
+    that reports by exception. Where PV is rounded, a run of repeats is held in two cases: the run
+    ends in a jump that rounding cannot make, or noise leaves a value as it is for so long less than
+    once in a record. The step of rounding is the least difference of any two values.
 
     Args:
         pv: one output, shape (N,).
@@ -54,9 +54,9 @@ def held_rows(pv: FloatArray) -> BoolArray:
 def _stays(pv: FloatArray, step: float) -> float:
     """Return how likely white noise leaves a rounded value as it is, where that is likeliest.
 
-    The variance of the noise is what two changes in succession take back of each other (Roll 1984,
-    J. Finance 39, 1127), less that of rounding. What two that are farther apart have in common is a
-    trend, which hides some of it.
+    The variance of the noise is the negative covariance of successive changes (Roll 1984,
+    J. Finance 39, 1127), less the variance of rounding. A trend raises that covariance: the
+    covariance of changes two samples apart, which noise leaves at 0, is taken off.
 
     Args:
         pv: shape (N,).

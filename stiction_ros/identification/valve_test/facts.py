@@ -53,13 +53,14 @@ def facts_before(record: Record, found: Identification, limits: Limits) -> Facts
     _of_one_loop(record)
     valve, step, model = found.valves[0], record.sample_time, found.outputs[0]
     answer = StepAnswer.of(model, valve.name, len(record), step)
-    left = record.pv[:, 0] - model.free_run({valve.name: found.stem[:, 0]}, record.pv[:, 0])
+    shown = record.pv[:, 0]
+    left = shown - model.free_run({valve.name: found.stem[:, 0]}, shown)
     if not np.isfinite(left).all():  # a level: PV bounds what it does by itself
-        left = record.pv[:, 0]
+        left = shown
     facts = facts_of_answer(answer, valve.name, float(record.op[-1, 0]), 0.0, left)
-    pv = float(record.pv[-round(facts.hold / step) :, 0].mean())
+    pv = float(shown[-round(facts.hold / step) :].mean())
     reach = max(2.0 * valve.static_interval[1], WIDENS**2 * SMALLEST)
-    room = float(np.abs(record.pv[:, 0] - pv).max()) + reach * abs(facts.gain or 0.0)
+    room = float(np.abs(shown - pv).max()) + reach * abs(facts.gain or 0.0)
     facts = dataclasses.replace(facts, pv=pv, op_limit=reach, pv_limit=(pv - room, pv + room))
     return limits.of(facts)
 

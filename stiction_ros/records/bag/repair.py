@@ -77,8 +77,12 @@ def repair_bag(path: str | Path) -> Repair:
 def _look(path: Path) -> finish.FileContent:
     """Return what a file holds, damaged or not."""
     scan = McapScan(path, salvage=True)
-    times = [message.log_time for message in scan.messages()]
-    first, last = min(times, default=None), max(times, default=None)
+    first: int | None = None
+    last: int | None = None
+    for message in scan.messages():
+        time = message.log_time
+        first = time if first is None else min(first, time)
+        last = time if last is None else max(last, time)
     return finish.FileContent(BagFile(path.name, scan.counts, first, last), scan)
 
 
