@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from stiction_ros.discrepancy.answer.results import Discrepancy as Discrepancy
     from stiction_ros.discrepancy.decision.decide import GapVerdict as GapVerdict
     from stiction_ros.discrepancy.gap_options import GapOptions as GapOptions
-    from stiction_ros.discrepancy.workflow import find_discrepancy as find_gap
+    from stiction_ros.discrepancy.workflow import find_discrepancy
     from stiction_ros.effects.behaviour import Behaviour as Behaviour
     from stiction_ros.effects.friction.he import HeStiction as HeStiction
     from stiction_ros.errors import InputError as InputError
@@ -61,6 +61,8 @@ if TYPE_CHECKING:
     from stiction_ros.records.record import Record as Record
     from stiction_ros.records.run.record_to_bag import write_bag as write_bag
     from stiction_ros.report.record_page import report_record as report_record
+
+    find_gap = find_discrepancy
 
 __version__ = "0.1.0"
 
@@ -103,45 +105,7 @@ _HOMES = {
     "write_csv": "records.csv_writer",
 }
 
-__all__ = [
-    "Behaviour",
-    "ControlMode",
-    "ControlSettings",
-    "CsvColumns",
-    "Discrepancy",
-    "GapOptions",
-    "GapVerdict",
-    "HeStiction",
-    "Identification",
-    "IdentificationOptions",
-    "InputError",
-    "LinearIdentification",
-    "LinearOptions",
-    "LiveRun",
-    "LoopModel",
-    "MpcController",
-    "Plant",
-    "Record",
-    "Scenario",
-    "SetPoints",
-    "StepResult",
-    "VerdictKind",
-    "__version__",
-    "effects",
-    "find_config",
-    "find_gap",
-    "fit_linear",
-    "identify",
-    "plot",
-    "prbs_experiment",
-    "read",
-    "report_record",
-    "run_live",
-    "simulate",
-    "simulate_closed_loop",
-    "write_bag",
-    "write_csv",
-]
+__all__ = sorted((*_HOMES, "__version__", "effects"))
 
 
 def __getattr__(name: str) -> Any:
