@@ -16,8 +16,7 @@ from stiction_ros.records.parts import joined, span
 from stiction_ros.records.record import Record
 from stiction_ros.records.valve_work import ValveWork
 from stiction_ros.report.page import Cell, number, table, write_page
-from stiction_ros.report.run.identified import process_table, valve_cards, verdict_line
-from stiction_ros.report.shapes import responses
+from stiction_ros.report.run.identified import process_table, responses, valve_cards, verdict_line
 from stiction_ros.texts import finite, probability
 
 

@@ -12,10 +12,14 @@ from stiction_ros.pages.frame import words
 from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.page import duration, interval, number
 from stiction_ros.report.record_page import report_record
-from stiction_ros.report.run.identified import valve_cards, verdict_line
+from stiction_ros.report.run.identified import (
+    step_response,
+    true_response,
+    valve_cards,
+    verdict_line,
+)
 from stiction_ros.report.run.report import headline, report_run
 from stiction_ros.report.run.story import tell
-from stiction_ros.report.shapes import step_response, true_response
 
 FIGURES = (
     "The same set-point moves before and after",

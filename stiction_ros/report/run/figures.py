@@ -9,9 +9,9 @@ from stiction_ros.pages.frame import text, words
 from stiction_ros.pages.plot import Curve, over_time
 from stiction_ros.pages.signals import Units, View, over_record
 from stiction_ros.records.record import Quality
+from stiction_ros.report.run.identified import responses
 from stiction_ros.report.run.scoring import errors
 from stiction_ros.report.run.story import Story
-from stiction_ros.report.shapes import responses
 
 
 def draw_run(story: Story) -> list[str]:

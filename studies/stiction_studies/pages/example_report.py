@@ -11,9 +11,8 @@ from stiction_ros.pages.plot import SCRIPT, Curve, against, over_time
 from stiction_ros.pages.signals import Units, all_signals
 from stiction_ros.report.page import Cell, card, duration, number, table
 from stiction_ros.report.record_page import evidence_table
-from stiction_ros.report.run.identified import KINDS, process_table, verdict_line
+from stiction_ros.report.run.identified import KINDS, process_table, responses, verdict_line
 from stiction_ros.report.run.story import TANK_UNITS
-from stiction_ros.report.shapes import responses
 from stiction_ros.signals.holds import set_point_moves
 from stiction_ros.texts import finite
 from stiction_studies.examples.comparison import Against, Comparison, ValveComparison

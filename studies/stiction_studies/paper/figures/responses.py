@@ -7,7 +7,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification
 from stiction_ros.pages.plot import Curve, over_time
-from stiction_ros.report.shapes import step_response, true_response
+from stiction_ros.report.run.identified import step_response, true_response
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import printed_example
 from stiction_studies.paper.sources import Sources
