@@ -17,37 +17,25 @@ from stiction_ros.gain.retuning import FASTEST, UNCHANGED, best_tuning, times_as
 from stiction_ros.identification.result import CauseKind, Identification
 from stiction_ros.records.record import Record
 
+# share of what comes by which a figure may miss it. One that would miss more in a loop at the 5th
+# or 95th percentile of those drawn is not given: the record does not tell what would come
 AGREED = 0.25
-"""Share of what comes by which a figure may miss it. One that would miss more in a loop at the 5th
-or 95th percentile of those drawn is not given: the record does not tell what would come."""
-
-AGREED_NOW = 0.05
-"""The same as a share of now."""
-
-EMBEDDING_SAMPLES = 1000
-"""Samples of a run of the embedding, the last ones."""
-
-TAKEN_OVER = 200
-"""Samples before it that the controller takes over."""
-
-ENDS = (5.0, 95.0)
-"""Percentiles of the draws that are given as interval."""
-
+AGREED_NOW = 0.05  # the same as a share of now
+EMBEDDING_SAMPLES = 1000  # samples of a run of the embedding, the last ones
+TAKEN_OVER = 200  # samples before it that the controller takes over
+ENDS = (5.0, 95.0)  # percentiles of the draws that are given as interval
+# share by which a drawn loop may differ from the record in IAE and amplitude: what does not cycle
+# as recorded is not the loop that was recorded
 REPEATS = 0.25
-"""Share by which a drawn loop may differ from the record in IAE and amplitude: what does not cycle
-as recorded is not the loop that was recorded."""
-
+# drawn loops that must repeat the record, the likeliest among them, for anything to be said
 FEWEST = 10
-"""Drawn loops that must repeat the record, the likeliest among them, for anything to be said."""
-
+# causes by which a loop shows its process well enough to be tuned by it: what comes from outside
+# and is fed back tells as much of the controller as of the process
 RETUNED = (CauseKind.VALVE, CauseKind.TUNING)
-"""Causes by which a loop shows its process well enough to be tuned by it: what comes from outside
-and is fed back tells as much of the controller as of the process."""
-
 KEYS = tuple(field.name for field in dataclasses.fields(Measures))
 
+# measures on which the drawn loops must agree, in words
 WORDS = {"iae_per_hour": "mean |PV−SP|", "amplitude": "amplitude"}
-"""Measures on which the drawn loops must agree, in words."""
 
 
 class What(enum.StrEnum):
@@ -96,9 +84,6 @@ class Option:
         """Return the option, without figures where they would not hold in each drawn loop.
 
         The note says on which measure the loops do not agree, and on which they do.
-
-        Args:
-            now: of the record.
         """
         if self.measures is None or not (apart := self._apart(now)):
             return self
@@ -127,7 +112,7 @@ class Option:
 
     def to_dict(self) -> dict[str, Any]:
         """Return an entry of ``options`` of ``gain --json``."""
-        measures = dict.fromkeys(KEYS) if self.measures is None else self.measures.to_dict()
+        measures = dict.fromkeys(KEYS) if self.measures is None else vars(self.measures)
         return {
             "what": self.what.value,
             **measures,
@@ -156,22 +141,17 @@ class Gain:
         return {
             "valve": self.valve,
             "output": self.output,
-            "now": self.now.to_dict(),
+            "now": dict(vars(self.now)),
             "options": [option.to_dict() for option in self.options],
             "notes": list(self.notes),
         }
 
 
 def gain_of(record: Record, found: Identification, valve: str | None = None) -> Gain:
-    """Simulate what would help one valve of a record.
+    """Simulate what would help one valve of a record, its longest good part.
 
-    Args:
-        record: what was measured, its longest good part.
-        found: what identification made of it.
-        valve: tag; None takes the one whose band is widest for its OP.
-
-    Raises:
-        InputError: there is no model, or no controller can be recovered.
+    Without a tag it is the valve whose band is widest for its OP. InputError where there is no
+    model, or where no controller can be recovered.
     """
     loop = RecordedLoop.of(record, found, valve)
     draws = loop.drawn(np.random.default_rng(SEED))
@@ -298,12 +278,7 @@ def option_of(
 ) -> Option:
     """Return the option of its draws; one that grows in half of them is none.
 
-    Args:
-        what: is tried.
-        runs: of the draws.
-        note: one sentence.
-        settings: of the option.
-        likeliest: draws at the begin whose mean is given; 0 gives the medians of all.
+    The mean of the ``likeliest`` draws at the begin is given; 0 gives the medians of all.
     """
     stable = [run for run in runs if run is not None]
     if 2 * len(stable) <= len(runs) or None in runs[:likeliest]:

@@ -34,10 +34,6 @@ class Measures:
     reversals_per_hour: float  # of the stem
     period: float | None = None  # at which the amplitude is, s; None where there is none
 
-    def to_dict(self) -> dict[str, float | None]:
-        """Return the mapping of ``gain --json``."""
-        return dataclasses.asdict(self)
-
 
 @dataclasses.dataclass(frozen=True)
 class Yardstick:
@@ -52,12 +48,7 @@ class Yardstick:
         return self.measure(error, stem) if np.isfinite(error).all() else None
 
     def measure(self, error: FloatArray, stem: FloatArray) -> Measures:
-        """Return the measures of one run.
-
-        Args:
-            error: PV − SP, shape (n,), engineering units.
-            stem: shape (n,), %.
-        """
+        """Return the measures of one run by PV − SP, engineering units, and stem, %, (n,) each."""
         hours = len(error) * self.sample_time / 3600.0
         line = 0.0 if self.cycles else None
         period = None

@@ -29,10 +29,6 @@ class SolvedStart:
         """Whether it may win: finite, feasible and stable."""
         return self.feasible and self.stable and math.isfinite(self.objective)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values."""
-        return dataclasses.asdict(self)
-
 
 @dataclasses.dataclass(frozen=True)
 class SearchLog:
@@ -50,18 +46,9 @@ class SearchLog:
     starts: tuple[SolvedStart, ...] = ()  # starts of the nonlinear programme, in order
 
     @property
-    def solves(self) -> int:
-        """Number of runs of IPOPT."""
-        return len(self.starts)
-
-    @property
     def capped(self) -> int:
         """Runs of IPOPT that ended at their limit of iterations."""
         return sum(start.status == CAPPED for start in self.starts)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values."""
-        return dataclasses.asdict(self)
 
 
 @dataclasses.dataclass(frozen=True, repr=False, kw_only=True)
@@ -73,5 +60,5 @@ class PaperIdentification(Identification):
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json`` but for ``record``."""
         document = super().to_dict()
-        document["model"]["search"] = self.search.to_dict()
+        document["model"]["search"] = dataclasses.asdict(self.search)
         return document

@@ -37,10 +37,6 @@ class ValveWork:
         """Return the work of one hour, of what was done in ``hours``."""
         return ValveWork(self.travel / hours, self.moves / hours, self.reversals / hours)
 
-    def to_dict(self) -> dict[str, float]:
-        """Return ``{travel, moves, reversals}``."""
-        return dataclasses.asdict(self)
-
 
 def work_per_hour(record: Record) -> Mapping[str, ValveWork]:
     """Return the work of each valve of ``record`` by tag; empty where its stems are unknown.

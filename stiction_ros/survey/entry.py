@@ -93,13 +93,9 @@ class Entry:
         del row["beats"]
         return row
 
-    def to_line(self) -> dict[str, Any]:
-        """Return all of it, as :meth:`from_line` takes it."""
-        return dataclasses.asdict(self)
-
     @classmethod
     def from_line(cls, line: Mapping[str, Any]) -> "Entry":
-        """Return the entry of a mapping that :meth:`to_line` made, also through JSON."""
+        """Return the entry of a mapping of all its fields, also through JSON."""
         row = dict(line)
         cycle = row["oscillation"]
         row["oscillation"] = None if cycle is None else Cycling(**cycle)

@@ -1,5 +1,6 @@
 """Results as they come, a line each, from which a survey that was broken off goes on."""
 
+import dataclasses
 import hashlib
 import itertools
 import json
@@ -60,7 +61,7 @@ class Journal:
     def add(self, key: str, entry: Entry) -> None:
         """Keep a loop."""
         self.known[key] = entry
-        self._write({"key": key, "entry": entry.to_line()})
+        self._write({"key": key, "entry": dataclasses.asdict(entry)})
 
     def _write(self, line: Any) -> None:
         self._file.write(json_text(line, indent=None).encode() + b"\n")

@@ -81,11 +81,7 @@ class Neighbours:
 
 
 def neighbours(records: Mapping[str, Record]) -> Neighbours:
-    """Judge the loops of one plant, each by its record, and tell who disturbs whom.
-
-    Args:
-        records: by the name of the loop, all of one stretch of time.
-    """
+    """Judge the loops of one plant by records of one stretch of time; tell who disturbs whom."""
     plain = SurveyOptions(gain=False, pages=False)
     alone = {n: assess(Loop(n, (), (record,)), plain).entry for n, record in records.items()}
     by_name = dict(alone)

@@ -104,7 +104,7 @@ def test_service_is_predicted_as_the_loop_without_friction_does(
 def test_leaving_the_loop_is_now(gain: Gain) -> None:
     left = gain.option(What.LEAVE).measures
     assert left is not None
-    for key, value in left.to_dict().items():
+    for key, value in vars(left).items():
         assert value == pytest.approx(getattr(gain.now, key))
 
 

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from typing import Any
 
 import numpy as np
 
@@ -51,10 +50,6 @@ class OutputLook:
         """The gap over that of the baseline, s₁/s₀."""
         return self.gap / max(self.baseline, 1e-300)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the mapping that diagnostics carry."""
-        return dataclasses.asdict(self)
-
 
 def begun_at_stems(model: LoopModel, record: Record, count: int) -> Record:
     """Return the last ``count`` samples, the first OP replaced by the modelled stems.
@@ -79,8 +74,7 @@ def begun_at_stems(model: LoopModel, record: Record, count: int) -> Record:
 def baseline_of(model: LoopModel, record: Record) -> tuple[OutputBaseline, ...]:
     """Return the noise of every output in the baseline.
 
-    Raises:
-        InputError: another loop's record, or a model whose free run grows without bound.
+    A record of another loop, and a model whose free run grows without bound, are refused.
     """
     run = FreeRun(model, join_records(model, [record]))
     return tuple(_output_baseline(run, i) for i in range(len(model.outputs)))
@@ -105,7 +99,7 @@ def look_at(
     shares = measure_gap(Baseline.of(run))
     looks = []
     for i, base in enumerate(known):
-        rows = _rows(run, i)
+        rows = run.blocks(i).scored  # held-out ones included
         gap = _innovation_std(run, i, base.ar, rows)
         freedom = base.freedom * int(rows.sum()) / max(base.rows, 1)
         limit, back = (
@@ -117,13 +111,8 @@ def look_at(
     return tuple(looks)
 
 
-def _rows(run: FreeRun, output: int) -> BoolArray:
-    """Return the rows that can be scored, held-out ones included, shape (N,)."""
-    return run.blocks(output).scored
-
-
 def _output_baseline(run: FreeRun, output: int) -> OutputBaseline:
-    rows = _rows(run, output)
+    rows = run.blocks(output).scored  # held-out ones included
     noise = fit_noise(
         run.gap[:, output], run.free[output], Blocks(rows, np.zeros_like(rows, dtype=bool))
     )

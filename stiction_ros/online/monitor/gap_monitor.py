@@ -82,7 +82,7 @@ class GapLook:
             "grown": self.grown,
             "alarm": self.alarm,
             "failure": self.failure,
-            "outputs": {look.name: look.to_dict() for look in self.outputs},
+            "outputs": {look.name: dataclasses.asdict(look) for look in self.outputs},
         }
 
 

@@ -355,13 +355,10 @@ def report_run(
     seconds: float | None = None,
     load: float | None = None,
 ) -> RunReport:
-    """Write ``summary.json`` and ``report.html`` of a live loop.
+    """Write ``summary.json`` and ``report.html`` of a live loop into a folder, or the page alone.
 
-    Args:
-        log: of its run.
-        out: folder, made when missing; or the ``.html`` file alone.
-        scenario: that was run, for the comparison with a loop without friction.
-        seconds, load: wall time of the run, and of the machine before it, where known.
+    The ``scenario`` that was run serves to compare with a loop without friction. Wall time in
+    seconds, and the load of the machine before, are told where they are known.
     """
     story = tell(log, scenario=scenario)
     figures = summary(story, seconds, load)

@@ -48,10 +48,6 @@ class Score:
     offset: float  # |mean error| at the end of the holds
     iae_per_hour: float  # mean |error| less the share of known noise, PV units × h per h
 
-    def to_dict(self) -> dict[str, float | None]:
-        """Return the mapping of ``summary.json``."""
-        return dataclasses.asdict(self)
-
 
 @dataclasses.dataclass(frozen=True)
 class Phase:

@@ -1,5 +1,6 @@
 """``summary.json`` of a run: the figures that acceptance looks at."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -51,20 +52,9 @@ def summary(
 
 def measured(phases: Mapping[str, Phase | None]) -> dict[str, dict[str, Any]]:
     """Return ``phases``, ``valve_work`` and ``largest_op_step`` of those that there are."""
-    there = {name: phase for name, phase in phases.items() if phase is not None}
-    return {
-        "phases": {name: scores(phase) for name, phase in there.items()},
-        "valve_work": {
-            name: {valve: work.to_dict() for valve, work in phase.work.items()}
-            for name, phase in there.items()
-        },
-        "largest_op_step": {name: dict(phase.op_step) for name, phase in there.items()},
-    }
-
-
-def scores(phase: Phase) -> dict[str, dict[str, float | None]]:
-    """Return ``{PV: {amplitude, offset, iae_per_hour}}``."""
-    return {name: score.to_dict() for name, score in phase.scores.items()}
+    there = {n: dataclasses.asdict(phase) for n, phase in phases.items() if phase is not None}
+    parts = {"phases": "scores", "valve_work": "work", "largest_op_step": "op_step"}
+    return {key: {n: phase[part] for n, phase in there.items()} for key, part in parts.items()}
 
 
 def messages(

@@ -111,7 +111,7 @@ def _score(run: ColumnRun, period: float | None) -> ColumnScore:
         )
     steps = largest_op_step(record)
     valves = {
-        tag: ValveScore(**ValveWork.of(record.stem[:, j]).to_dict(), op_step=steps[tag])
+        tag: ValveScore(**vars(ValveWork.of(record.stem[:, j])), op_step=steps[tag])
         for j, tag in enumerate(record.valves)
     }
     median, last = np.median(run.times), np.percentile(run.times, 99)

@@ -147,7 +147,7 @@ def run_trial(number: int, method: str, seed: int) -> Trial:
         delays=tuple(delay for output in found.outputs for delay in output.delay.values()),
         squared_error=round(log.objective, 6) if log and np.isfinite(log.objective) else None,
         seconds=round(seconds, 3),
-        solves=log.solves if log else 0,
+        solves=len(log.starts) if log else 0,
         capped=log.capped if log else 0,
         points=log.points if log else 0,
     )

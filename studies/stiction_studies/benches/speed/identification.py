@@ -213,7 +213,7 @@ def fight(plan: Plan, duel: Duel, begin: Callable[[str], Progress]) -> list[Row]
         (
             f"paper's NLP, M = {nlp_options.starts}",
             nlp,
-            f"{log.solves} solves, {log.capped} of them ended at their limit of iterations",
+            f"{len(log.starts)} solves, {log.capped} of them ended at their limit of iterations",
         ),
         (f"paper's grid, step {step:g} %", grid, f"{points} points, all of them worked through"),
     ]

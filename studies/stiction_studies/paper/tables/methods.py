@@ -35,7 +35,7 @@ def table_of_times(sources: Sources) -> Exhibit:
             log = told.search if isinstance(told, PaperIdentification) else None
             points = count_points(example.record, printed.options(example, "grid"))
             work = {"exact": "", "evidence": "", "grid": f", {points} points"}.get(
-                method, f", {log.solves if log else 0} runs of IPOPT"
+                method, f", {len(log.starts) if log else 0} runs of IPOPT"
             )
             friction = ", ".join(
                 f"{v.static_friction:.2f} / {v.dynamic_friction:.2f}"
