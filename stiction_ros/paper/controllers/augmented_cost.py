@@ -75,7 +75,7 @@ class AugmentedCost:
     ) -> None:
         """Condense, for ``frictions`` with None for a healthy valve and ``bounds``, (p, 2)."""
         self.model, self.weights, self.frictions = model, weights, tuple(frictions)
-        self.part = HorizonCost(model, weights.in_stems)
+        self.part = HorizonCost(model, weights)
         self.horizon = weights.horizon
         self._bounds = np.array([[-np.inf, np.inf]]) if bounds is None else bounds
         bounded = np.isfinite(self._bounds).any(axis=1)

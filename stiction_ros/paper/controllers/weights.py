@@ -40,22 +40,13 @@ class ProgrammeCost(enum.StrEnum):
     PLAIN = "plain"  # (19a) with the weights of the unaware controller, Δu penalised
 
 
-@dataclasses.dataclass(frozen=True)
-class AugmentedWeights:
-    """Penalties of (22) and the terminal penalty of (19a)."""
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class AugmentedWeights(HorizonWeights):
+    """Penalties of (22): those of (19a), with Δχ in place of Δu, and on stems and OP."""
 
-    horizon: int  # N_H, samples
-    stem: FloatArray  # block of Q_z on χ_{i−1} − χ_ss, shape (m, m)
-    state: FloatArray  # block of Q_z on ξ_i − ξ_ss, shape (n, n)
-    move: FloatArray  # Q_s on Δχ, shape (m, m)
+    stem: FloatArray  # block of Q_z on χ_{i−1} − χ_ss, shape (m, m); that on ξ_i − ξ_ss is state
     op: FloatArray  # R on u_i − u_s, shape (m, m)
-    terminal: FloatArray  # V_F on ξ_N − ξ_ss, shape (n, n)
     op_move: FloatArray | None = None  # S on Δu, (m, m), which (22) has not; None for none
-
-    @property
-    def in_stems(self) -> HorizonWeights:
-        """The part that (19a) has as well, with Δχ in place of Δu."""
-        return HorizonWeights(self.horizon, self.state, self.move, self.terminal)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,15 +76,15 @@ def unaware_weights(preset: WeightPreset, model: LinearModel, horizon: int) -> H
         Q = \frac{C^T C}{\max c_{ij}^2} + 0.01 I, \quad S = \text{diag}(10, 100), \quad
         V_F = 10^3 I.
 
-    Args:
-        preset: printed or corrected, which say what max c²_ij means.
-        model: A.3 or another with two valves.
-        horizon: N_H, samples.
-
-    Raises:
-        InputError: not two valves, for which S is not printed.
+    The preset, printed or corrected, says what max c²_ij means. S is printed for two valves.
     """
-    _check_valves(model)
+    count = model.b.shape[1]
+    if count != len(MOVE_WEIGHTS):
+        raise InputError(
+            f"the paper gives S for {len(MOVE_WEIGHTS)} valves, the loop has {count}",
+            where="preset",
+            fix="use preset: own",
+        )
     n = model.order
     largest = (model.c**2).max() if preset is WeightPreset.PRINTED else model.c.max() ** 2
     stage = model.c.T @ model.c / largest + STATE_WEIGHT * np.eye(n)
@@ -114,27 +105,16 @@ def augmented_weights(preset: WeightPreset, model: LinearModel, horizon: int) ->
         diagonal[PRINTED_ENTRIES:] = 0.0
     return AugmentedWeights(
         horizon,
-        np.diag(diagonal[:m]),
         np.diag(diagonal[m:]),
         STEM_MOVE_WEIGHT * np.eye(m),
-        OP_WEIGHT * np.eye(m),
         TERMINAL_WEIGHT * np.eye(n),
+        stem=np.diag(diagonal[:m]),
+        op=OP_WEIGHT * np.eye(m),
     )
 
 
 def plain_weights(unaware: HorizonWeights) -> AugmentedWeights:
     """Return (19a) as the cost of the augmented model: no Q_z on stems, no Q_s, no R."""
     none = np.zeros_like(unaware.move)
-    return AugmentedWeights(
-        unaware.horizon, none, unaware.state, none, none, unaware.terminal, unaware.move
-    )
-
-
-def _check_valves(model: LinearModel) -> None:
-    count = model.b.shape[1]
-    if count != len(MOVE_WEIGHTS):
-        raise InputError(
-            f"the paper gives S for {len(MOVE_WEIGHTS)} valves, the loop has {count}",
-            where="preset",
-            fix="use preset: own",
-        )
+    told = unaware.horizon, unaware.state, none, unaware.terminal
+    return AugmentedWeights(*told, stem=none, op=none, op_move=unaware.move)

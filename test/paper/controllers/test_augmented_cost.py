@@ -16,7 +16,8 @@ def random_weights(random: np.random.Generator, horizon: int, m: int, n: int) ->
         root = random.normal(size=(size, size))
         return root @ root.T
 
-    return AugmentedWeights(horizon, square(m), square(n), square(m), square(m), square(n))
+    first = horizon, square(n), square(m), square(n)
+    return AugmentedWeights(*first, stem=square(m), op=square(m))
 
 
 def equation_22(

@@ -224,9 +224,8 @@ def _plain_ipopt(design: ControlDesign) -> Callable[[PlanProblem], FloatArray]:
     """Return (19) as a sparse programme of CasADi that IPOPT solves; built once."""
     m, weights = len(design.model.stem0), design.unaware
     nothing = np.zeros((m, m))
-    augmented = AugmentedWeights(
-        weights.horizon, nothing, weights.state, weights.move, nothing, weights.terminal
-    )
+    told = weights.horizon, weights.state, weights.move, weights.terminal
+    augmented = AugmentedWeights(*told, stem=nothing, op=nothing)
     healthy: Frictions = (None,) * m
     cost = AugmentedCost(design.model, augmented, healthy)
     programme = SmoothedProgramme(design.model, PaperTuning(augmented), healthy, design.limits.stem)
