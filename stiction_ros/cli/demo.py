@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
 
     scenarios = [load_scenario(path) for path in paths]
     require_ros()
-    signal.signal(signal.SIGTERM, _interrupt)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C
     good = True
     if opcua is not None:
         directory = Path(options.out) / OPCUA
@@ -208,7 +208,3 @@ def _speed(text: str) -> float | None:
     if not speed > 0:
         raise argparse.ArgumentTypeError(f"{text!r} is neither max nor a positive number")
     return speed
-
-
-def _interrupt(_number: int, _frame: Any) -> None:
-    raise KeyboardInterrupt

@@ -1,19 +1,16 @@
 """``stiction fit-linear``: a linear model of a record, without friction."""
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.identify import delay_range
 from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared import searches
 from stiction_ros.cli.shared.as_json import write_json
 from stiction_ros.cli.shared.progress import bar
-from stiction_ros.errors import storing
 from stiction_ros.records.parts import longest_part
 
 if TYPE_CHECKING:
@@ -46,13 +43,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--criterion", default="bic", choices=searches.CRITERIA, help="criterion of the order (bic)"
     )
-    parser.add_argument(
-        "--delay",
-        type=delay_range,
-        default=(0, 10),
-        metavar="LO:HI",
-        help="delays to try, samples (0:10)",
-    )
+    searches.add_delay(parser, "delays to try")
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.add_argument("--out", metavar="F", help="write the loop model, F.loop.yaml")
     parser.add_argument(
@@ -88,9 +79,7 @@ def run(options: argparse.Namespace) -> int:
     if found.status in (LinearStatus.NO_MODEL, LinearStatus.UNSTABLE):
         return 1
     if options.out is not None:
-        name = Path(options.out).name.removesuffix(".yaml").removesuffix(".loop")
-        with storing(options.out):
-            found.loop_model(name or "loop", options.limits).save(options.out)
+        searches.write_model(options.out, lambda name: found.loop_model(name, options.limits))
     return 0
 
 

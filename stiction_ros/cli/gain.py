@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -17,10 +17,6 @@ from stiction_ros.gain.advice import advice
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.set_points import SetPoints
 from stiction_ros.texts import probability
-
-if TYPE_CHECKING:
-    from stiction_ros.identification import Identification
-    from stiction_ros.records.record import Record
 
 MEASURES = {
     "amplitude": "amplitude",
@@ -90,6 +86,7 @@ def _of_model(options: argparse.Namespace) -> Any:
 
 
 def _of_record(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
+    """Return what would help, and what was found of the valve that it would help."""
     from stiction_ros.gain.gain import gain_of
     from stiction_ros.identification import IdentificationOptions, identify
     from stiction_ros.records.parts import longest_part
@@ -107,15 +104,9 @@ def _of_record(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
         identified = identify(record, settings, show_share)
     with bar("simulating"):
         gain = gain_of(record, identified, options.valve)
-    return gain, _verdict(record, identified, gain)
-
-
-def _verdict(record: "Record", identified: "Identification", gain: Any) -> dict[str, Any]:
-    """Return what was found of the valve that was looked at, as it stands in the JSON."""
-    index = record.valves.index(gain.valve)
-    valve = identified.valves[index].to_dict()
+    valve = identified.valves[record.valves.index(gain.valve)].to_dict()
     keys = ("verdict", "probability", "law", "f_s", "f_s_interval", "f_d", "f_d_interval")
-    return {key: valve[key] for key in keys}
+    return gain, {key: valve[key] for key in keys}
 
 
 def show(found: Any, verdict: Mapping[str, Any]) -> None:

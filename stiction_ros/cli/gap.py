@@ -11,8 +11,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.identify import delay_range
 from stiction_ros.cli.shared import intake_options as intake
+from stiction_ros.cli.shared import searches
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.config_files import find_config
@@ -54,13 +54,7 @@ def add(commands: Any) -> None:
         action="store_true",
         help="fit a linear model to the longest record, where there is no model yet",
     )
-    parser.add_argument(
-        "--delay",
-        type=delay_range,
-        default=(0, 10),
-        metavar="LO:HI",
-        help="delays that --fit-linear tries, samples (0:10)",
-    )
+    searches.add_delay(parser, "delays that --fit-linear tries")
     parser.add_argument(
         "--quick",
         action="store_true",
@@ -87,7 +81,8 @@ def run(options: argparse.Namespace) -> int:
         found = find_discrepancy(model, records, settings, progress=show)
     if options.out is not None:  # first: who reads what is printed may stop doing so
         _write(found, Path(options.out))
-    hand_over(options.json, found.to_dict(), lambda: _print(found, _again(options)))
+    given = ["stiction", "gap", *["--fit-linear"] * options.fit_linear, *options.inputs]
+    hand_over(options.json, found.to_dict(), lambda: _print(found, shlex.join(given)))
     return EXIT_CODES[found.verdict]
 
 
@@ -131,13 +126,8 @@ def _write(found: "Discrepancy", directory: Path) -> None:
     print(f"report: {report_gap(found, directory)}", file=sys.stderr)
 
 
-def _again(options: argparse.Namespace) -> str:
-    """Return the command with what it was given, to which a further record may be added."""
-    given = [*(["--fit-linear"] if options.fit_linear else []), *options.inputs]
-    return shlex.join(["stiction", "gap", *given])
-
-
 def _print(found: "Discrepancy", command: str) -> None:
+    """Print the answer; to the ``command`` that was given a further record may be added."""
     from stiction_ros.report.gap_words import called, plain
 
     console = Console()

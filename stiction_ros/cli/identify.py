@@ -21,7 +21,6 @@ from stiction_ros.texts import plural, probability, symbol
 
 if TYPE_CHECKING:
     from stiction_ros.identification import Identification, ValveEstimate
-    from stiction_ros.records.record import Record
 
 
 def add(commands: Any) -> None:
@@ -48,13 +47,7 @@ def add(commands: Any) -> None:
         help="order n_b of the process (default: n_a); methods of the paper take one order, or "
         "one for each valve in a row for each output",
     )
-    option(
-        "--delay",
-        type=delay_range,
-        default=(0, 10),
-        metavar="LO:HI",
-        help="delays to try, samples (0:10)",
-    )
+    searches.add_delay(parser, "delays to try")
     searches.add_law(parser)
     option(
         "--kind",
@@ -73,15 +66,6 @@ def add(commands: Any) -> None:
     option("--json", metavar="F", help="write the result as JSON; - for stdout")
     option("--out", metavar="DIR", help="write the page report.html there")
     parser.set_defaults(run=run)
-
-
-def delay_range(text: str) -> tuple[int, int]:
-    """Return ``LO:HI`` (or one number) as a range."""
-    low, _, high = text.partition(":")
-    try:
-        return int(low), int(high or low)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no range, write LO:HI") from None
 
 
 def run(options: argparse.Namespace) -> int:
@@ -103,7 +87,9 @@ def run(options: argparse.Namespace) -> int:
     with bar("identifying") as show:
         found = search(record, show)
     if options.model is not None:
-        _write_model(record, found, options.model)
+        from stiction_ros.identification.answer.identified_loop import identified_loop
+
+        searches.write_model(options.model, lambda name: identified_loop(record, found, name))
     document = {"record": str(options.record)} | found.to_dict()
     if options.json is not None:
         write_json(options.json, document)
@@ -123,15 +109,6 @@ def run(options: argparse.Namespace) -> int:
         page = report_record(record, found, directory, parts)
         print(f"report: {page}", file=sys.stderr)
     return 0
-
-
-def _write_model(record: "Record", found: "Identification", target: str) -> None:
-    from stiction_ros.identification.answer.identified_loop import identified_loop
-
-    name = Path(target).name.removesuffix(".yaml").removesuffix(".loop")
-    model = identified_loop(record, found, name or "loop")
-    with storing(target):
-        model.save(target)
 
 
 def _print(document: Mapping[str, Any], found: "Identification") -> None:

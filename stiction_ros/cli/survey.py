@@ -16,10 +16,9 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.identify import delay_range
 from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared.as_json import write_json
-from stiction_ros.cli.shared.searches import add_law
+from stiction_ros.cli.shared.searches import add_law, delay_range
 from stiction_ros.cli.survey_progress import progress
 from stiction_ros.errors import InputError, foreign, storing
 from stiction_ros.intake.sheets.cells import Numbers

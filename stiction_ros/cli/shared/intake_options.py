@@ -131,11 +131,7 @@ def is_model(source: str) -> bool:
 
 
 def opened(options: argparse.Namespace) -> Loop:
-    """Return the loop of the record that the command line names.
-
-    Raises:
-        InputError: it cannot be read; columns given for a bag, a namespace for a file.
-    """
+    """Return the loop of the record that the command line names; InputError if none is read."""
     path = Path(options.record)
     if is_bag(path):
         if columns(options) != CsvColumns():

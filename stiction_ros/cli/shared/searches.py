@@ -2,13 +2,15 @@
 
 import argparse
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from stiction_ros.effects import Stiction, behaviours
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 
 if TYPE_CHECKING:
     from stiction_ros.identification import Identification, IdentificationOptions
+    from stiction_ros.loop import LoopModel
     from stiction_ros.records.record import Record
 
 T = TypeVar("T", int, float)
@@ -45,6 +47,33 @@ def add_law(parser: Any) -> None:
         help=f"friction law: {' | '.join(laws())}, or auto: for each valve he, or another that "
         "explains PV clearly better (default: auto; with other methods than evidence: he)",
     )
+
+
+def add_delay(parser: Any, what: str) -> None:
+    """Add the option of the delays from OP to PV to a parser."""
+    parser.add_argument(
+        "--delay",
+        type=delay_range,
+        default=(0, 10),
+        metavar="LO:HI",
+        help=f"{what}, samples (0:10)",
+    )
+
+
+def delay_range(text: str) -> tuple[int, int]:
+    """Return ``LO:HI`` (or one number) as a range."""
+    low, _, high = text.partition(":")
+    try:
+        return int(low), int(high or low)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no range, write LO:HI") from None
+
+
+def write_model(target: str, made: "Callable[[str], LoopModel]") -> None:
+    """Write the loop model that is made for a name: that of its file."""
+    name = Path(target).name.removesuffix(".yaml").removesuffix(".loop")
+    with storing(target):
+        made(name or "loop").save(target)
 
 
 def add_search_options(parser: Any) -> None:
@@ -96,8 +125,7 @@ def refuse_channel_orders(
 ) -> dict[str, int | None]:
     """Return the orders that all channels share; those per channel go to ``chosen``.
 
-    Raises:
-        InputError: orders per channel for a search that has one for all.
+    They are refused for a search that has one order for all channels.
     """
     plain: dict[str, int | None] = {}
     for option, key in (("na", "output_order"), ("nb", "input_order")):
