@@ -260,6 +260,17 @@ class OutputModel:
         drive = driven(self.b.values(), delays, [stems[valve] for valve in self.b], self.bias)
         return fitted_free_run(self.a, drive, measured)
 
+    def equation(self, noise_std: float, enters: str) -> dict[str, Any]:
+        """Return the entry of a loop model's ``process.outputs``, with white noise."""
+        return {
+            "name": self.name,
+            "a": [float(value) for value in self.a],
+            "b": {valve: [float(value) for value in taps] for valve, taps in self.b.items()},
+            "delay": {valve: int(delay) for valve, delay in self.delay.items()},
+            "bias": float(self.bias),
+            "noise": {"std": float(noise_std), "enters": enters},
+        }
+
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""
         return {

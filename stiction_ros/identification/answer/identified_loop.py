@@ -59,7 +59,7 @@ def identified_loop(record: Record, found: Identification, name: str) -> LoopMod
         "process": {
             "kind": "arx",
             "outputs": [
-                _output(model, bias, white)
+                model.equation(white, "measurement") | {"bias": bias}
                 for model, bias, (white, _, _) in zip(found.outputs, biases, noises, strict=True)
             ],
         },
@@ -127,18 +127,6 @@ def _repeats(loop: LoopModel, record: Record, stem: FloatArray) -> bool:
         state = loop.process.advance(state, row, none, noise)
     off: FloatArray = np.sqrt(np.mean((run - record.pv) ** 2, axis=0))
     return bool((off <= record.pv.std(axis=0)).all())
-
-
-def _output(model: OutputModel, bias: float, white: float) -> dict[str, Any]:
-    """Return an entry of ``process.outputs``, in deviations from the operating point."""
-    return {
-        "name": model.name,
-        "a": list(model.a),
-        "b": {valve: list(taps) for valve, taps in model.b.items()},
-        "delay": dict(model.delay),
-        "bias": bias,
-        "noise": {"std": white, "enters": "measurement"},
-    }
 
 
 def _rests(record: Record, found: Identification) -> FloatArray:

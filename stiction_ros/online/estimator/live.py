@@ -341,17 +341,7 @@ class LiveEstimator:
             friction = trusted.get(name)
             effects = [] if friction is None else [friction.behaviour().to_mapping()]
             valves.append({"name": name, "effects": effects})
-        outputs = [
-            {
-                "name": output.name,
-                "a": [float(v) for v in output.a],
-                "b": {valve: [float(v) for v in b] for valve, b in output.b.items()},
-                "delay": {valve: int(d) for valve, d in output.delay.items()},
-                "bias": float(output.bias),
-                "noise": {"std": float(output.noise_std), "enters": "equation"},
-            }
-            for output in models
-        ]
+        outputs = [output.equation(output.noise_std, "equation") for output in models]
         provenance = [
             self._provenance(name, update, found.samples)
             for name in self.valves
