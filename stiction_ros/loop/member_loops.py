@@ -10,9 +10,8 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop.model import LoopModel
 
+# behind the tag of an output: the OP of an outer loop, which is the set-point of this output
 SET_POINT = ".SP"
-"""Behind the tag of an output: the OP of an outer loop, which is the set-point of this output."""
-
 _ENTRY = re.compile(r"\s*(?P<name>[A-Za-z]\w*)\s*:(?P<valves>[^>]+)->(?P<outputs>[^>]+)")
 
 
@@ -28,15 +27,10 @@ class MemberLoop:
 
 
 def read_member_loops(entries: Sequence[str], model: LoopModel, where: str) -> list[MemberLoop]:
-    """Return the loops of texts such as ``TC1: FV1 -> T1`` or ``LC1: F1.SP -> L1``.
+    """Return the loops of a plant by texts such as ``TC1: FV1 -> T1`` or ``LC1: F1.SP -> L1``.
 
-    Args:
-        entries: one text a loop; several tags stand with commas.
-        model: the plant.
-        where: named in messages.
-
-    Raises:
-        InputError: a text of another form, an unknown tag, or one that two loops have.
+    Several tags stand with commas. A text of another form, an unknown tag, and one that two loops
+    have are refused.
     """
     loops: list[MemberLoop] = []
     for text in entries:
@@ -68,11 +62,6 @@ def _check(tags: list[str], known: set[str], where: str) -> None:
 def is_set_point(tag: str) -> bool:
     """Tell whether an OP is the set-point of an inner loop and moves no valve of its own."""
     return tag.endswith(SET_POINT)
-
-
-def whole_plant(model: LoopModel) -> MemberLoop:
-    """Return the one loop, without a name of its own, that has all tags of ``model``."""
-    return MemberLoop("", model.valve_names, model.outputs)
 
 
 class Wiring:

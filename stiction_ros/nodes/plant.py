@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 from stiction_ros.config_files import find_config
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.loop import LoopModel, Plant, SetPoints, read_valve_changes
-from stiction_ros.loop.member_loops import MemberLoop, Wiring, read_member_loops, whole_plant
+from stiction_ros.loop.member_loops import MemberLoop, Wiring, read_member_loops
 from stiction_ros.nodes.shared.managed import LOOKS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_ns, to_stamp, values_of
 from stiction_ros.nodes.shared.peers import Outlet, publishers_of
@@ -73,7 +73,8 @@ class PlantNode(ManagedNode):
         self.stamp = self._start
         self._realtime = settings.pace == "realtime"
         loops = read_member_loops(settings.loops, self.model, "plant: loops")
-        self.wiring = Wiring(self.model, loops or [whole_plant(self.model)])
+        whole = MemberLoop("", self.model.valve_names, self.model.outputs)
+        self.wiring = Wiring(self.model, loops or [whole])
         self.round_trips = RoundTrips()
         self._missed = self._repeats = 0
         self._shown = time.monotonic()

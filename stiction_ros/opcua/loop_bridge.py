@@ -138,7 +138,7 @@ class LoopBridge:
         """Take in which tags of any loop the server refuses, and why; return what to write."""
         found = [f"tag {tag} {read[tag]}" for tag in self.tags.read_tags() if tag in read]
         if self.rules.writes:
-            mine = [tag for tag in self.tags.written_tags() if tag in written]
+            mine = [tag for tag, _ in self.tags.uses() if tag in written]
             found += [f"tag {tag} {written[tag]}" for tag in mine]
         self.refused = tuple(dict.fromkeys(found))
         return self.look(now)

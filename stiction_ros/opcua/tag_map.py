@@ -89,10 +89,6 @@ class LoopTags:
             found += [self.grant.heartbeat, self.grant.alive]
         return tuple(dict.fromkeys(tag for tag in found if tag))
 
-    def written_tags(self) -> Iterator[str]:
-        """Yield the tags that may be written."""
-        yield from (tag for tag, _ in self.uses())
-
     def uses(self) -> Iterator[tuple[str, Use]]:
         """Yield the tags that may be written, each with what for."""
         if self.grant is not None:
@@ -126,7 +122,7 @@ class TagMap:
             check_address(server, f"{path}: server")
         _once([loop.loop for loop in loops], f"{path}: loops", "loop")
         _once([loop.namespace for loop in loops], f"{path}: loops", "namespace")
-        written = [tag for loop in loops for tag in loop.written_tags()]
+        written = [tag for loop in loops for tag, _ in loop.uses()]
         _once(written, f"{path}: loops", "written tag")
         return cls(server, loops)
 

@@ -17,8 +17,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.signals.state_space import responses
 from stiction_ros.signals.subspace_projection import StateSequence
 
-TINY = 1e-24
-"""Variance, in that of the outputs, below which an error counts as none."""
+TINY = 1e-24  # variance, in that of the outputs, below which an error counts as none
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,11 +35,6 @@ class Realisation:
     def radius(self) -> float:
         """Largest pole, |λ|."""
         return spectral_radius(self.a)
-
-    @property
-    def predictor_radius(self) -> float:
-        """Largest pole of the one-step predictor A − K C."""
-        return spectral_radius(self.a - self.k @ self.c)
 
 
 def spectral_radius(matrix: FloatArray) -> float:
@@ -116,7 +110,7 @@ def with_best_gain(
     rivals = [dataclasses.replace(model, k=k) for k in gains]
 
     def loss(rival: Realisation) -> float:
-        if rival.predictor_radius >= 1.0:
+        if spectral_radius(rival.a - rival.k @ rival.c) >= 1.0:
             return float("inf")
         error = (y - predict(rival, u, y, one_step=True))[:, s:]
         return float(np.linalg.slogdet(error @ error.T / error.shape[1] + TINY * np.eye(len(y)))[1])

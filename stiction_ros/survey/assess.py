@@ -83,7 +83,8 @@ def _assessed(loop: Loop, entry: Entry, options: SurveyOptions) -> Assessed:
     if entry.auto_share == 0.0:
         return _ended(entry, Status.SKIPPED, "it was in manual all the time")
     record = _named(longest_part(loop.parts), entry.name)
-    entry = dataclasses.replace(entry, saturated_share=saturated(record))
+    op = record.op[:, 0]
+    entry = dataclasses.replace(entry, saturated_share=at_limits(op, resting_limits(op)))
     if len(record) < FEWEST:
         reason = f"its longest good part in automatic has {len(record)} of {FEWEST} samples"
         return _ended(entry, Status.SKIPPED, reason)
@@ -173,12 +174,6 @@ def _beats(record: Record, output: int, cycling: Cycling | None) -> tuple[float,
     error = pv - (pv.mean() if record.sp is None else record.sp[:, output])
     rows = beats(error, cycling.period / record.sample_time)
     return tuple((record.start + record.sample_time * rows).tolist())
-
-
-def saturated(record: Record) -> float:
-    """Return the share of samples at which the first valve's OP rests at an end of its range."""
-    op = record.op[:, 0]
-    return at_limits(op, resting_limits(op))
 
 
 def at_limits(op: FloatArray, limits: tuple[float, float]) -> float:

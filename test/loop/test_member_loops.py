@@ -4,7 +4,7 @@ import pytest
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.loop.member_loops import MemberLoop, Wiring, read_member_loops, whole_plant
+from stiction_ros.loop.member_loops import MemberLoop, Wiring, read_member_loops
 
 CASCADE = LoopModel.load(find_config("cascade.loop.yaml"))
 LOOPS = read_member_loops(["LC1: F1.SP -> L1", "FC1: FV1 -> F1"], CASCADE, "here")
@@ -41,6 +41,7 @@ def test_the_op_of_an_outer_loop_is_the_next_set_point_of_the_inner_one() -> Non
 
 
 def test_one_loop_of_all_tags_changes_nothing() -> None:
-    wiring, scheduled = Wiring(CASCADE, [whole_plant(CASCADE)]), np.array([40.0, 51.0])
+    whole = MemberLoop("", CASCADE.valve_names, CASCADE.outputs)
+    wiring, scheduled = Wiring(CASCADE, [whole]), np.array([40.0, 51.0])
     assert wiring.set_points(scheduled).tolist() == scheduled.tolist()
     assert wiring.take([np.array([60.0])]).tolist() == [60.0]

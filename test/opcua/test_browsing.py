@@ -39,7 +39,7 @@ def test_the_controllers_of_the_plant_are_found(plant: PlantProcess, tmp_path: P
     assert first.valves[0].op_read == f"nsu={NAMESPACE};s=CC.OUT"
     assert first.valves[0].mode == f"nsu={NAMESPACE};s=CC.MODE"
     assert first.grant is None
-    assert list(first.written_tags()) == []
+    assert list(first.uses()) == []
 
 
 def test_names_that_nothing_bears_are_said(

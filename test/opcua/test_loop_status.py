@@ -47,7 +47,7 @@ def test_cut_ops_are_a_warning_with_their_counts() -> None:
 def test_refused_tags_are_an_error_and_the_first_three_are_named() -> None:
     status = Status()
     plant = status.plant
-    names = [PV, *plant.bridge.tags.written_tags()]
+    names = [PV, *dict(plant.bridge.tags.uses())]
     plant.do(plant.bridge.refuse({PV: "is refused (BadX)"}, dict.fromkeys(names, "no"), plant.now))
     level, text, values = status.now()
     assert level == "error"

@@ -48,7 +48,7 @@ def test_a_loop_is_read(tmp_path: Path) -> None:
     assert loop.grant.watchdog == 5.0
     assert "ns=2;s=FIC101.PV" in loop.read_tags()
     assert "ns=2;s=FIC101.ROUT_IN" not in loop.read_tags()
-    assert set(loop.written_tags()) == {
+    assert dict(loop.uses()).keys() == {
         "nsu=urn:plant;s=FIC101.REQ",
         "ns=2;s=FIC101.BEAT",
         "ns=2;s=FIC101.ROUT_IN",
@@ -57,7 +57,7 @@ def test_a_loop_is_read(tmp_path: Path) -> None:
 
 def test_without_a_section_write_nothing_may_be_written(tmp_path: Path) -> None:
     loop = {key: value for key, value in LOOP.items() if key != "write"}
-    assert list(load(tmp_path, loop).loops[0].written_tags()) == []
+    assert list(load(tmp_path, loop).loops[0].uses()) == []
 
 
 def changed(*path: Any, value: Any) -> dict[str, Any]:

@@ -73,7 +73,7 @@ def run(name: str, make: Callable[[], ManagedNode]) -> int:
         except _UNUSABLE as error:
             print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
             return 2
-        if _is_realtime(node):
+        if node.has_parameter("pace") and node.get_parameter("pace").value == "realtime":
             sys.setswitchinterval(SWITCH)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
@@ -101,7 +101,3 @@ def run(name: str, make: Callable[[], ManagedNode]) -> int:
         try_shutdown()
         for number in (signal.SIGINT, signal.SIGTERM):  # Python would die of one while it ends
             signal.signal(number, signal.SIG_IGN)
-
-
-def _is_realtime(node: ManagedNode) -> bool:
-    return bool(node.has_parameter("pace") and node.get_parameter("pace").value == "realtime")

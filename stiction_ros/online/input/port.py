@@ -183,7 +183,8 @@ class InputPort:
 
     def due(self, stamp: int) -> int:
         """Return the number of the sample at a stamp, or of the next one if that is over."""
-        return self.next if self.next == 0 else max(self.next, self._grid.number_of(stamp))
+        grid = self._grid
+        return self.next if self.next == 0 else max(self.next, grid.number + grid.ahead(stamp))
 
     def stamp_of(self, number: int) -> int:
         """Return the stamp of a sample of the present run, ns."""

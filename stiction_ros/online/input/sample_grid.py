@@ -37,10 +37,6 @@ class SampleGrid:
         """Return how many samples ``stamp`` is after the present one."""
         return (stamp - self.stamp + self.step // 2) // self.step
 
-    def number_of(self, stamp: int) -> int:
-        """Return the number of the sample that a stamp belongs to."""
-        return self.number + self.ahead(stamp)
-
     def stamp_of(self, number: int) -> int:
         """Return the stamp of a sample of the present run, ns."""
         return self.stamp + (number - self.number) * self.step

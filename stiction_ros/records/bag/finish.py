@@ -134,7 +134,7 @@ def rewrite(
 
 def write_listing(directory: Path, contents: Sequence[FileContent]) -> None:
     """Write ``metadata.yaml`` for the files of a bag, one at least, in their order."""
-    text = metadata.metadata_yaml(_information(contents))
+    text = metadata.yaml_text({"rosbag2_bagfile_information": _information(contents)})
     partial = directory / f"{METADATA}.part"
     with partial.open("w", encoding="utf-8") as stream:
         stream.write(text)

@@ -76,7 +76,7 @@ class BagTopic:
 
 def qos_yaml(profiles: Sequence[Qos]) -> str:
     """Return the YAML list of ``profiles`` that goes into the channel metadata."""
-    return _yaml([profile.mapping() for profile in profiles]).strip() if profiles else ""
+    return yaml_text([profile.mapping() for profile in profiles]).strip() if profiles else ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -143,13 +143,9 @@ def bag_information(
 
 def metadata_record(information: Mapping[str, Any]) -> dict[str, str]:
     """Return the content of the MCAP metadata record ``rosbag2``."""
-    return {"serialized_metadata": _yaml(information)}
+    return {"serialized_metadata": yaml_text(information)}
 
 
-def metadata_yaml(information: Mapping[str, Any]) -> str:
-    """Return the text of ``metadata.yaml``."""
-    return _yaml({"rosbag2_bagfile_information": information})
-
-
-def _yaml(value: Any) -> str:
+def yaml_text(value: Any) -> str:
+    """Return ``value`` as rosbag2 writes it."""
     return yaml.safe_dump(value, sort_keys=False, allow_unicode=True)

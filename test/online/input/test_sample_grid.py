@@ -24,7 +24,7 @@ def test_exact_stamps_stay_exact(first: int, count: int) -> None:
     for k in range(1, count):
         grid.advance(first + k * STEP)
     assert grid.stamp_of(0) == first
-    assert grid.number_of(first + 3 * STEP) == 3
+    assert grid.number + grid.ahead(first + 3 * STEP) == 3
 
 
 def test_numbers_go_on_when_a_run_begins_anew() -> None:
