@@ -28,13 +28,12 @@ from stiction_ros.paper.controllers.weights import (
 from stiction_ros.processes import LinearModel
 from stiction_ros.settings import check_choices, setting
 
+# weight of a move over that of what it does to the outputs, squared: as printed for Example 1,
+# whose outputs move by 1 for a stem of 1 %
 MOVE_SHARES = {"move_weights": 0.1, "embedding_move_weights": 0.01}
-"""Weight of a move over that of what it does to the outputs, squared: as printed for Example 1,
-whose outputs move by 1 for a stem of 1 %."""
-
+# stem move, %, by which a load is thought to wander in a sample, and below which no measurement is
+# believed: as in the scenario of Example 1
 FINEST = 0.01
-"""Stem move, %, by which a load is thought to wander in a sample, and below which no measurement is
-believed: as in the scenario of Example 1."""
 
 
 class Formulations(enum.StrEnum):

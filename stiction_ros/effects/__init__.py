@@ -65,8 +65,7 @@ from stiction_ros.effects.valve.saturation import Saturation as Saturation
 from stiction_ros.effects.valve.slew import Slew as Slew
 from stiction_ros.errors import InputError
 
-DEFAULT_LAW = "he"
-"""Of stiction, where YAML names none."""
+DEFAULT_LAW = "he"  # of stiction, where YAML names none
 
 
 def from_mapping(values: Mapping[str, Any]) -> Behaviour:

@@ -128,12 +128,7 @@ class PiControllers:
 
 
 def own_controller(model: LoopModel) -> PiController:
-    """Return the controller that ``model`` records, at rest at the loop's starting point.
-
-    Raises:
-        InputError: the loop records no controller, or has more valves or outputs than a PI
-            controller serves.
-    """
+    """Return the controller that ``model`` records, at rest at the loop's starting point."""
     if model.controller is None:
         raise InputError(
             "the loop has no controller of its own",

@@ -19,9 +19,8 @@ from stiction_ros.signals.controller_recovery import smoothed
 
 BEYOND = 1e4  # times the size of the record from which on a run is taken as gone
 
+# sets OP of sample k, shape (R, N, m), by PV, shape (R, N, p), up to it
 Control = Callable[[int, FloatArray, FloatArray], None]
-"""Sets OP of sample k, shape (R, N, m), by PV, shape (R, N, p), up to it."""
-
 Laws = Sequence[Sequence[Behaviour | None]]  # of each valve of each run; None: ideal
 
 
@@ -47,12 +46,8 @@ class Stems:
     ) -> None:
         """Let every valve, its law in %, follow a recorded OP from its stem on.
 
-        Args:
-            laws: of all valves.
-            op: recorded, scaled, shape (H, m).
-            start: stems at its first sample, scaled, shape (m,).
-            units: mean and scale of OP, %, shape (m,) each.
-            sample_time: s.
+        OP, shape (H, m), and the stems at its first sample, shape (m,), are scaled by the
+        ``units``: mean and scale of OP, %, shape (m,) each.
         """
         self._laws, self._sample_time, self._count = laws, sample_time, 0
         self._mean, self._scale = units
@@ -82,13 +77,10 @@ class RecoveredControl:
     def __init__(
         self, controllers: Controllers, tunings: FloatArray, sp: FloatArray, pv: FloatArray
     ) -> None:
-        """Follow the recorded errors.
+        """Follow the recorded errors of SP, (N, p), and PV before the first sample, (H, p).
 
-        Args:
-            controllers: one a valve; a valve without one keeps the recorded OP.
-            tunings: (K, K_i, K_d), shape (R, m, 3).
-            sp: shape (N, p).
-            pv: recorded before the first sample that is run, shape (H, p).
+        The ``tunings`` are (K, K_i, K_d), shape (R, m, 3). A valve without one of the
+        ``controllers`` keeps the recorded OP.
         """
         self._rows = list(zip(*(each.tolist() for each in controllers), strict=True))
         self._sp = sp
@@ -118,16 +110,10 @@ def run_again(
 ) -> tuple[FloatArray, FloatArray]:
     """Return PV, shape (R, n, p), and stems, shape (R, n, m), from sample H on; n = N − H.
 
-    Args:
-        equations: of all runs.
-        stems: before sample H, shape (R, m, H); H is at least the lags and the longest delay, and
-            3 + the longest lag of OP.
-        valves: which have followed OP up to there.
-        control: of all valves; what it does not set stays as recorded.
-        loop: recorded OP, shape (N, m), and PV, shape (N, p).
-
-    Returns:
-        PV is infinite throughout in a run that grows without end.
+    The ``stems`` are those before sample H, shape (R, m, H), up to which the ``valves`` have
+    followed OP; H is at least the lags and the longest delay, and 3 + the longest lag of OP. What
+    ``control`` does not set stays as in the ``loop``: recorded OP, shape (N, m), and PV, (N, p).
+    PV is infinite throughout in a run that grows without end.
     """
     a, b, delay, outside = equations
     (number, _, lags), past = a.shape, stems.shape[2]

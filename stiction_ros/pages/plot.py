@@ -14,21 +14,19 @@ from stiction_ros.pages.frame import text, words
 from stiction_ros.signals.holds import stretches
 from stiction_ros.texts import DAY, HOUR
 
+# units across the area of a figure over time, which is as wide as its page, and its height, px
 WIDE, TALL = 1000, 240
-"""Units across the area of a figure over time, which is as wide as its page, and its height, px."""
-
 SIDE = 300  # width and height of a figure that has no time
 MOST = 3000  # points of a curve; of a longer one the lowest and highest of each stretch are kept
 ROOM = 0.04  # share of the range that is left free above and below
 KINDS = ("pv", "op", "stem", "free", "sp", "ink")  # colours of curves that are of one kind
 
+# steps between two dates on an axis, s
 CALENDAR = [
     *(1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800),
     *(round(HOUR * k) for k in (1, 2, 3, 6, 12)),
     *(round(DAY * k) for k in (1, 2, 7, 14, 28, 91, 182, 364)),
 ]
-"""Steps between two dates on an axis, s."""
-
 SCRIPT = """
 const CALENDAR = STEPS, views = new Map();
 const show = (view, a, b) => {

@@ -16,10 +16,9 @@ from stiction_ros.records.record import Quality, QualityArray
 
 GAP = 5.5  # a step of more usual steps than this is a gap: the record is split there
 
+# share of the places that may be without a row, and the mean square by which steps may stray from
+# their mean, over that mean: rows missing at random make the one as large as the other
 SLIGHT = 0.1
-"""Share of the places that may be without a row, and the mean square by which steps may stray
-from their mean, over that mean: rows missing at random make the one as large as the other."""
-
 HOLE = 1.5  # a step of more usual steps than this is a hole in which samples are missing
 CAUGHT_UP = 0.25  # steps by which rows may still be late when a delay is over: half of the most
 SHORTEST = 3  # samples that a repair needs at least

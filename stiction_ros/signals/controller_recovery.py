@@ -33,36 +33,20 @@ from stiction_ros.signals.velocity_form import terms
 
 BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
-LEAST_FIT = 0.2
-"""R² from which on a controller is believed: rounded and held signals leave no more."""
-
-NEARLY = 0.03
-"""R² that a shorter span may lose against the best one."""
-
+LEAST_FIT = 0.2  # R² from which on a controller is believed: rounded and held signals leave no more
+NEARLY = 0.03  # R² that a shorter span may lose against the best one
+# spans h tried, samples: about 1.6 times the one before
 SPANS = (1, 2, 3, 5, 8, 12, 20, 32, 50, 80, 130)
-"""Spans h tried, samples: about 1.6 times the one before."""
-
-LAGS = (0, 1, 2)
-"""Samples between PV and the OP that answers it."""
-
-FILTERS = (0.0, 0.5, 0.8)
-"""Shares of the last value in the filter of the error, per sample."""
-
-BLOCKS = 12
-"""Blocks of the jackknife behind the standard errors."""
-
+LAGS = (0, 1, 2)  # samples between PV and the OP that answers it
+FILTERS = (0.0, 0.5, 0.8)  # shares of the last value in the filter of the error, per sample
+BLOCKS = 12  # blocks of the jackknife behind the standard errors
+# R² of what is left that a sample of lag or a filter must explain to be taken, a derivative half
+# more: with it the law of one sample later is another form of the law without
 PRICE = 0.01
-"""R² of what is left that a sample of lag or a filter must explain to be taken, a derivative half
-more: with it the law of one sample later is another form of the law without."""
-
-LEAST_ROWS = 30
-"""Samples in automatic that a fit needs."""
-
-CLIPPED_RUN = 5
-"""Samples in a row at its end of range from which on OP may rest at a limit."""
-
+LEAST_ROWS = 30  # samples in automatic that a fit needs
+CLIPPED_RUN = 5  # samples in a row at its end of range from which on OP may rest at a limit
+# values between its ends that OP must take for a rest at an end to be a limit, not a step
 CLIPPED_LEVELS = 20
-"""Values between its ends that OP must take for a rest at an end to be a limit, not a step."""
 
 
 def recover(signals: LoopSignals, longest_span: int) -> RecoveredController:

@@ -29,33 +29,17 @@ from stiction_ros.signals.spectral_lines import fitted_lines, taken_by_lines
 
 Stretches = Sequence[tuple[int, int]]
 
-LEAST_LINE = 0.25
-"""Share of the variance inside the stretches that a cycle explains at least."""
-
-NEEDED_CYCLES = 4
-"""Whole cycles below which one cannot speak of a cycle."""
-
-SHORTEST = 6.0
-"""Samples of a period; below that a cycle cannot be told from noise."""
-
-FINE = 16
-"""Frequencies per line width: a step turns the phase by 1/16 of a cycle over a stretch."""
-
-FASTEST = 2.0
-"""Samples of a period: what turns at each sample."""
-
+LEAST_LINE = 0.25  # share of the variance inside the stretches that a cycle explains at least
+NEEDED_CYCLES = 4  # whole cycles below which one cannot speak of a cycle
+SHORTEST = 6.0  # samples of a period; below that a cycle cannot be told from noise
+FINE = 16  # frequencies per line width: a step turns the phase by 1/16 of a cycle over a stretch
+FASTEST = 2.0  # samples of a period: what turns at each sample
+# zero crossings of the autocorrelation needed, and looked at: later ones are noise
 CROSSINGS = 6, 13
-"""Zero crossings of the autocorrelation needed, and looked at: later ones are noise."""
-
-NEAR = 1.4
-"""Factor within which the line of a regular oscillation lies from its period."""
-
-REGULAR = 1.0
-"""Regularity from which on an oscillation is regular."""
-SLOW = 3.0
-"""Periods over which the slow mean is taken."""
-FAST = 8.0
-"""Parts of a period over which noise is averaged out."""
+NEAR = 1.4  # factor within which the line of a regular oscillation lies from its period
+REGULAR = 1.0  # regularity from which on an oscillation is regular
+SLOW = 3.0  # periods over which the slow mean is taken
+FAST = 8.0  # parts of a period over which noise is averaged out
 
 
 @dataclasses.dataclass(frozen=True)

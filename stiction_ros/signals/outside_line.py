@@ -26,23 +26,13 @@ from stiction_ros.signals.spectral_lines import (
     waves_of,
 )
 
-ORDER = 5
-"""n, samples of the past: enough to leave white noise of what loops are sampled at."""
-
+ORDER = 5  # n, samples of the past: enough to leave white noise of what loops are sampled at
+# H at most: the first three that a square or a triangle wave has; the best number is taken
 HARMONICS = 5
-"""H at most: the first three that a square or a triangle wave has; the best number is taken."""
-
-NEAR = 1.0
-"""Line widths 1/N by which the period may differ from the one given, to either side."""
-
-STEPS = 17
-"""Periods tried over this range: one eighth of a line width apart."""
-
-BESIDE = 3
-"""Order of the process that is fitted beside a line."""
-
-LEAST_ROWS = 40
-"""Rows that a fit needs."""
+NEAR = 1.0  # line widths 1/N by which the period may differ from the one given, to either side
+STEPS = 17  # periods tried over this range: one eighth of a line width apart
+BESIDE = 3  # order of the process that is fitted beside a line
+LEAST_ROWS = 40  # rows that a fit needs
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,11 +7,8 @@ from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 
-LEAST_PER_HARMONIC = 2.5
-"""Samples that the fastest harmonic has per period at least."""
-
-DEPENDENT = 1e-7
-"""Size of a direction, of scaled columns, below which it is rounding."""
+LEAST_PER_HARMONIC = 2.5  # samples that the fastest harmonic has per period at least
+DEPENDENT = 1e-7  # size of a direction, of scaled columns, below which it is rounding
 
 
 def waves_of(angle: FloatArray, harmonics: int) -> FloatArray:

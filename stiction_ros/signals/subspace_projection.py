@@ -17,8 +17,7 @@ from scipy.linalg import qr
 
 from stiction_ros.effects.behaviour import FloatArray
 
-RANK = 1e-10
-"""Singular values below this share of the largest count as zero."""
+RANK = 1e-10  # singular values below this share of the largest count as zero
 
 
 class SubspaceMethod(enum.StrEnum):
