@@ -13,6 +13,7 @@ from stiction_ros.intake.intake_options import TO_PERCENT, OpUnit, known_op_unit
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.tables.block import Block, Column
 from stiction_ros.intake.words import WORDS
+from stiction_ros.signals.tracking import nearness
 from stiction_ros.signals.velocity_form import explained
 
 PERCENT = (-10.0, 110.0)  # what an OP in % stays within
@@ -34,10 +35,6 @@ SEVERAL = frozenset(WORDS["several"])  # units of OP of which several ranges are
 OWN = "its own unit"  # what stands for the unit of an OP that is not known to be in %
 EXAMINED = 20_000  # samples that are looked at
 FEWEST = 50  # samples from which anything is told of a swap
-
-CLOSER, OFFSET, TRACKED = 0.1, 0.3, 0.7
-"""How much nearer to the set-point than the other the measurement is, as a share; its lasting
-offset as a share of its error's standard deviation; its error as a share of the set-point's."""
 
 
 def in_percent(
@@ -175,16 +172,11 @@ def refuse_swapped(block: Block) -> None:
 
 
 def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
-    """Return whether ``one`` is :data:`CLOSER` to the set-point, and it alone without an offset."""
+    """Return whether ``one`` stays near the set-point and ``other``, which moves, does not."""
     there = np.isfinite(sp) & np.isfinite(one) & np.isfinite(other)
-    if np.count_nonzero(there) < FEWEST:
+    if np.count_nonzero(there) < FEWEST or not np.ptp(other[there]) > 0.0:
         return False
-    errors = one[there] - sp[there], other[there] - sp[there]
-    near, far = (float(np.sqrt(np.mean(error**2))) for error in errors)
-    centred, other_centred = (abs(e.mean()) <= OFFSET * e.std() for e in errors)
-    if near > CLOSER * far or other_centred or not np.ptp(other[there]) > 0.0:
-        return False
-    return bool(centred or near <= TRACKED * sp[there].std())
+    return nearness(sp[there], one[there], other[there]) is not None
 
 
 def _swapped(block: Block, reason: str, otherwise: Sequence[str] = ()) -> InputError:

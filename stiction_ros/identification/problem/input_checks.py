@@ -2,8 +2,8 @@ r"""Can a record be worked on, and were OP and PV swapped in it?
 
 Of a swap there are two signs; only clear ones count.
 
-*Set-point.* PV tracks SP, OP does not. Where the column called OP lies at least ten times
-closer to SP than the column called PV and has no lasting offset from it, they are swapped.
+*Set-point.* PV tracks SP, OP does not: where the column called OP alone lies near SP, as
+:mod:`stiction_ros.signals.tracking` tells, they are swapped.
 
 *Controller.* A linear controller acts at once and without noise,
 
@@ -16,7 +16,6 @@ relation and no evidence; nor where a column follows exactly from the past, as t
 noise and the process may obey an exact relation of its own.
 """
 
-import dataclasses
 import enum
 
 import numpy as np
@@ -25,11 +24,9 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.record import Quality, Record
 from stiction_ros.signals.arx import lagged
+from stiction_ros.signals.tracking import CLOSER, nearness
 
 TOO_SHORT = "take a longer record, lower orders or a narrower delay range"
-CLOSER = 0.1  # distance of OP from SP over that of PV from which they are swapped
-OFFSET = 0.3  # lasting offset, as a share of the standard deviation of the error
-TRACKED = 0.7  # error, as a share of the standard deviation of a moving SP
 MAX_ORDER = 8
 MAX_SAMPLES = 4000
 WINDOWS = 60  # stretches of a record in which an exact relation is looked for
@@ -87,24 +84,6 @@ def require_samples(record: Record, needed: int, fix: str) -> None:
         )
 
 
-class SwapRule(enum.StrEnum):
-    """Which sign showed the swap."""
-
-    SET_POINT = "set_point"
-    CONTROLLER = "controller"
-
-
-@dataclasses.dataclass(frozen=True)
-class Evidence:
-    """Clear evidence that OP and PV are swapped."""
-
-    rule: SwapRule  # the sign
-    reason: str  # one sentence for people
-    # distance of the column OP from SP over that of the column PV, of the output where it is
-    # largest; or the sum of the coefficients on the side of PV over that on the side of OP
-    ratio: float
-
-
 class _Past(enum.Enum):
     """What a column is computed from; the value is the least lag of the other columns."""
 
@@ -112,19 +91,10 @@ class _Past(enum.Enum):
     ALONE = 1
 
 
-@dataclasses.dataclass(frozen=True)
-class _Relation:
-    """Exact relation of one column to others, by the :func:`_share` of either side."""
+def swapped_columns(record: Record) -> str | None:
+    """Return the evidence that OP and PV are swapped in one sentence, or None.
 
-    own: float
-    others: float
-
-
-def swapped_columns(record: Record) -> Evidence | None:
-    """Return the evidence that OP and PV are swapped in ``record``, or None.
-
-    Args:
-        record: m valves, p outputs; the set-point sign needs m = p, in the same order.
+    The set-point sign needs as many valves as outputs, in the same order.
     """
     if any(not np.ptp(part) > 0.0 for part in (*record.op.T, *record.pv.T) if len(part)):
         return None
@@ -135,63 +105,44 @@ def swapped_columns(record: Record) -> Evidence | None:
     if by_controller is not None and by_controller >= SIDES:
         return None
     if by_set_point is not None:
-        reason = (
+        return (
             f"the column taken for OP lies {1.0 / max(by_set_point, 1e-9):.0f} times closer to "
             "the set-point than the one taken for PV"
         )
-        return Evidence(SwapRule.SET_POINT, reason, by_set_point)
     if by_controller is not None:
-        reason = (
+        return (
             "the columns obey an exact controller equation whose integral action lies on the "
             "side of the column taken for PV"
         )
-        return Evidence(SwapRule.CONTROLLER, reason, by_controller)
     return None
 
 
-def refuse_swapped(record: Record, evidence: Evidence | None) -> None:
+def refuse_swapped(record: Record, evidence: str | None) -> None:
     """Raise InputError where there is evidence that OP and PV of ``record`` are swapped."""
     if evidence is not None:
         raise InputError(
-            f"OP and PV look swapped: {evidence.reason}",
+            f"OP and PV look swapped: {evidence}",
             where=record.name,
             fix="exchange the columns, as with --op V1=COLUMN --pv PV1=COLUMN",
         )
 
 
 def _set_point_ratio(record: Record) -> float | None:
-    """Return the ratio of distances from SP: ≤ CLOSER swapped, ≥ 1 / CLOSER not; else None.
-
-    Where both columns lie about SP, as those without their means do, the nearer one may be so by
-    its unit alone: that is no sign of a swap.
-    """
+    """Return the ratio of distances from SP: ≤ CLOSER swapped, ≥ 1 / CLOSER not; else None."""
     if record.sp is None or len(record.valves) != len(record.outputs):
         return None
     ratios = []
-    for i in range(len(record.outputs)):
-        sp = record.sp[:, i]
-        op_error, pv_error = record.op[:, i] - sp, record.pv[:, i] - sp
-        far, near = _size(pv_error), _size(op_error)
-        if near <= CLOSER * far and _tracks(op_error, sp) and not _tracks(pv_error, sp):
-            ratios.append(near / far)
-        elif far <= CLOSER * near and _tracks(pv_error, sp):
-            ratios.append(_over(near, far))
+    for sp, op, pv in zip(record.sp.T, record.op.T, record.pv.T, strict=True):
+        if (ratio := nearness(sp, op, pv)) is not None:
+            ratios.append(ratio)
+        elif (ratio := nearness(sp, pv, op, alone=False)) is not None:
+            ratios.append(_over(1.0, ratio))
         else:
             return None
     swapped = [ratio < 1.0 for ratio in ratios]
     if all(swapped):
         return max(ratios)
     return None if any(swapped) else min(ratios)
-
-
-def _tracks(error: FloatArray, sp: FloatArray) -> bool:
-    return bool(
-        abs(error.mean()) <= OFFSET * error.std() or _size(error) <= TRACKED * float(sp.std())
-    )
-
-
-def _size(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _controller_ratio(record: Record) -> float | None:
@@ -203,8 +154,8 @@ def _controller_ratio(record: Record) -> float | None:
     op, pv = _scaled_changes(part.op), _scaled_changes(part.pv)
     of_op = [_exact_relation(column, pv) for column in op]
     of_pv = [_exact_relation(column, op) for column in pv]
-    ratios = [_over(found.others, found.own) for found in of_op if found is not None]
-    ratios += [_over(found.own, found.others) for found in of_pv if found is not None]
+    ratios = [_over(others, own) for own, others in filter(None, of_op)]
+    ratios += [_over(own, others) for own, others in filter(None, of_pv)]
     if ratios and _follows_from_the_past(op, pv):
         return None
     if ratios and max(ratios) <= 1.0 / SIDES:
@@ -237,12 +188,11 @@ def _over(numerator: float, denominator: float) -> float:
     return numerator / max(denominator, 1e-30)
 
 
-def _exact_relation(own: FloatArray, others: FloatArray) -> _Relation | None:
+def _exact_relation(own: FloatArray, others: FloatArray) -> tuple[float, float] | None:
     """Return the exact relation of lowest order with an integrator on one side, or None.
 
-    Args:
-        own: scaled changes of one column, shape (N,).
-        others: those of the columns that it is computed from, shape (q, N).
+    It is told by the :func:`_share` of either side: ``own``, the scaled changes of one column,
+    shape (N,), and ``others``, those of the columns that it is computed from, shape (q, N).
     """
     if not own.any() or not others.any(axis=1).all():
         return None
@@ -253,9 +203,8 @@ def _exact_relation(own: FloatArray, others: FloatArray) -> _Relation | None:
         a, b = np.concatenate([[1.0], -theta[:order]]), theta[order:].reshape(-1, order + 1)
         if np.abs(b[:, 0]).max() < AT_ONCE * max(float(np.abs(b).max()), 1e-3):
             continue
-        found = _Relation(_share(a), max(_share(row) for row in b))
-        low, high = sorted((found.own, found.others))
-        if high > SIDES * low:
+        found = _share(a), max(_share(row) for row in b)
+        if max(found) > SIDES * min(found):
             return found
     return None
 

@@ -9,7 +9,7 @@ from as_given import read_csv
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.identification.problem.input_checks import Evidence, SwapRule, swapped_columns
+from stiction_ros.identification.problem.input_checks import swapped_columns
 from stiction_ros.records.record import Record
 from stiction_studies.examples import FAMILIES, NOISES, PLANTS, example1, example2, healthy_loop
 
@@ -62,7 +62,7 @@ def test_simulated_loops(make: object, variant: str, seed: int) -> None:
     assert swapped_columns(swapped(record)) is not None
     found = swapped_columns(without_sp(swapped(record)))
     assert found is not None
-    assert found.rule is SwapRule.CONTROLLER
+    assert "exact controller equation" in found
 
 
 @given(seed=st.integers(0, 1000), gain=st.floats(0.05, 3.0), integral=st.floats(3.0, 200.0))
@@ -79,10 +79,8 @@ def test_the_set_point_shows_a_swap_where_op_is_rounded() -> None:
     rounded = dataclasses.replace(record, op=np.round(record.op, 1))
     assert swapped_columns(rounded) is None
     found = swapped_columns(swapped(rounded))
-    assert isinstance(found, Evidence)
-    assert found.rule is SwapRule.SET_POINT
-    assert "closer to the set-point" in found.reason
-    assert found.ratio < 0.1
+    assert found is not None
+    assert "closer to the set-point" in found
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, -40.0])

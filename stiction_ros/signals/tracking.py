@@ -1,0 +1,34 @@
+"""Which of two columns follows the set-point."""
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+
+CLOSER = 0.1  # distance of a column from SP over that of another from which it is the nearer one
+OFFSET = 0.3  # lasting offset, as a share of the standard deviation of the error
+TRACKED = 0.7  # error, as a share of the standard deviation of a moving SP
+
+
+def nearness(
+    sp: FloatArray, one: FloatArray, other: FloatArray, *, alone: bool = True
+) -> float | None:
+    """Return the distance of ``one`` from SP over that of ``other``, shape (N,) each.
+
+    None where it is not clearly nearer, does not track SP, or, if it must do so ``alone``, the
+    other one tracks it as well: of columns that both lie about SP, as those without their means
+    do, the nearer one may be so by its unit alone.
+    """
+    error, away = one - sp, other - sp
+    near, far = _size(error), _size(away)
+    if near <= CLOSER * far and _tracks(error, sp) and not (alone and _tracks(away, sp)):
+        return near / max(far, 1e-30)
+    return None
+
+
+def _tracks(error: FloatArray, sp: FloatArray) -> bool:
+    centred = abs(error.mean()) <= OFFSET * error.std()
+    return bool(centred or _size(error) <= TRACKED * float(sp.std()))
+
+
+def _size(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
