@@ -64,7 +64,7 @@ class Trial:
         static = float(self.random.choice([0.5, 5.0, 20.0, 150.0]))
         laws = [
             HeStiction(static, 0.3 * static),
-            KanoStiction.from_frictions(static, 0.5 * static),
+            KanoStiction(1.5 * static, 0.5 * static),
             XchStiction(static, static),
             SemiPhysicalStiction(static, 0.7 * static, 1.5),
             None,

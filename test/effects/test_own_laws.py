@@ -157,11 +157,6 @@ def test_the_loop_model_has_every_parameter_that_was_found(
     assert told["viscous_interval"] == [0.25, 0.36]
 
 
-def test_frictions_alone_are_refused_where_another_parameter_has_no_default() -> None:
-    with pytest.raises(InputError, match=r"'viscous' of stiction \(falls_short\)"):
-        type(law()).from_frictions(4.0, 1.5)  # type: ignore[attr-defined]
-
-
 def test_the_jump_is_the_least_move_of_the_law(found: Identification) -> None:
     (valve,) = found.valves
     told = valve.with_own_jump()

@@ -46,7 +46,7 @@ def test_it_is_the_two_state_law(law: XchStiction, op: np.ndarray, start: float)
 
 @given(exact_laws, exact_signals, eighths)
 def test_it_is_kano_in_other_parameters(law: XchStiction, op: np.ndarray, start: float) -> None:
-    kano = KanoStiction.from_frictions(law.static_friction, law.dynamic_friction)
+    kano = KanoStiction(law.stick_band, law.jump)
     assert np.array_equal(law.simulate(op, start), kano.simulate(op, start))
 
 

@@ -9,7 +9,7 @@ import simulated_loops as loops
 from stiction_ros.effects import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
-from stiction_ros.identification.friction import find_law, laws, simulate
+from stiction_ros.identification.friction import behaviour_of, find_law, laws, simulate
 from stiction_ros.identification.result import Identification, ValveEstimate
 
 LAWS = ("kano", "choudhury", "xch")
@@ -23,7 +23,7 @@ class Results(dict[str, tuple[Identification, FloatArray]]):
     """By law, what is identified of a loop with that law, and its true stem."""
 
     def __missing__(self, law: str) -> tuple[Identification, FloatArray]:
-        record = loops.example1(2, samples=1000, valve=find_law(law).from_frictions(5.0, 2.0))
+        record = loops.example1(2, samples=1000, valve=behaviour_of(law, (5.0, 2.0), {}))
         assert record.stem is not None
         self[law] = identify(record, options(law)), record.stem
         return self[law]
@@ -96,7 +96,7 @@ def test_rows_of_every_law_are_static_and_dynamic_friction(law: str) -> None:
     u = 8.0 * np.sin(np.arange(200) / 9.0)
     rows = np.array([[5.0, 2.0], [3.0, 3.0], [1.5, 0.25]])
     stems = simulate(find_law(law), rows, u, 0.5)
-    alone = [find_law(law).from_frictions(*row).simulate(u, 0.5) for row in rows.tolist()]
+    alone = [behaviour_of(law, (s, d), {}).simulate(u, 0.5) for s, d in rows.tolist()]
     assert stems == pytest.approx(np.stack(alone, axis=1), abs=1e-12)
 
 

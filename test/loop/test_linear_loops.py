@@ -3,7 +3,7 @@ import pytest
 from known_loops import DELAY, A, B, Kind, known
 
 from stiction_ros.identification.closed_loop.repeated_runs import law_of
-from stiction_ros.identification.friction import find_law
+from stiction_ros.identification.friction import behaviour_of
 from stiction_ros.loop.linear_loops import Controllers, Process, Runs, ringing, run_loops
 from stiction_ros.loop.repeated_loops import Equations, RecoveredControl, Stems, run_again
 
@@ -70,7 +70,7 @@ def test_a_loop_under_any_controller_moves_as_in_the_kernel(
     equations = Equations(np.array([[A]]), np.array([[[B]]]), PROCESS.delay, outside)
     op, rest = np.zeros((PAST + 300, 1)), np.full((PAST + 300, 1), 20.0)
     stems, units = begun.stem.swapaxes(1, 2), (np.zeros(1), np.ones(1))
-    laws = [[find_law(law).from_frictions(*friction)]]
+    laws = [[behaviour_of(law, friction, {})]]
     valves = Stems(laws, op[:PAST], stems[0, :, 0], units, 1.0)
     control = RecoveredControl(ways, tuning, sp[0], rest[:PAST])
     again, _ = run_again(equations, stems, valves, control, (op, rest))

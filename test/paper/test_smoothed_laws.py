@@ -45,7 +45,7 @@ def test_a_law_without_a_smoothed_form_is_refused() -> None:
 @pytest.mark.trial
 @pytest.mark.parametrize("method", ["nlp", "grid"])
 def test_kano_is_found_by_its_own_law(method: str) -> None:
-    record = loops.example1(2, samples=1200, valve=KanoStiction.from_frictions(5.0, 2.0))
+    record = loops.example1(2, samples=1200, valve=KanoStiction(7.0, 3.0))
     own = PaperOptions(
         method=method,
         law="kano",

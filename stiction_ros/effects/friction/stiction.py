@@ -179,12 +179,6 @@ class FrictionPair(Stiction):
             )
 
     @classmethod
-    def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Self:
-        """Build from f_S and f_D in %, other parameters at their defaults, which they must have."""
-        _all_known(cls)
-        return cls(static_friction, dynamic_friction)
-
-    @classmethod
     def rows_of_frictions(cls, grid: FloatArray) -> FloatArray:
         """Return rows (f_S, f_D), %, as they are, shape (G, 2)."""
         return grid
@@ -210,12 +204,6 @@ class SlipJumpPair(Stiction):
 
     stick_band: float = parameter("s", "%", "deadband plus stickband S", low=0.0)
     jump: float = parameter("j", "%", "slip jump J of the stem", low=0.0)
-
-    @classmethod
-    def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Self:
-        """Build from f_S and f_D in %: S = f_S + f_D, J = f_S − f_D, others at their defaults."""
-        _all_known(cls)
-        return cls(static_friction + dynamic_friction, static_friction - dynamic_friction)
 
     def figures(self) -> dict[str, float]:
         both = {"f_s": self.static_friction, "f_d": self.dynamic_friction}
@@ -243,14 +231,3 @@ class SlipJumpPair(Stiction):
 
 FrictionLaw = FrictionPair | SlipJumpPair
 """A stiction law that can be identified; parameters behind the first two are searched as well."""
-
-
-def _all_known(kind: type[Stiction]) -> None:
-    """Refuse a law that two frictions do not tell all of."""
-    fields = {field.name: field.default for field in dataclasses.fields(kind)}
-    for entry in kind.parameters()[2:]:
-        if fields[entry.attribute] is dataclasses.MISSING:
-            raise InputError(
-                f"f_S and f_D alone do not tell {entry.key!r} of {kind.title()}",
-                fix="give all its parameters, as from_mapping takes them",
-            )

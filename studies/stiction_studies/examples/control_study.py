@@ -3,15 +3,15 @@
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlMode, FrictionSpread, MpcController, StepResult
-from stiction_ros.effects import HeStiction, KanoStiction, Stiction, XchStiction
+from stiction_ros.effects import HeStiction, Stiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.identification.friction import behaviour_of
 from stiction_ros.loop import ClosedLoopRun, LoopModel, Measurement, SetPoints, simulate_closed_loop
 from stiction_ros.online.session import Scenario
 from stiction_ros.paper.controllers.embedding import PrintedPlan
@@ -19,7 +19,7 @@ from stiction_ros.paper.controllers.weights import ProgrammeCost, WarmStart, Wei
 from stiction_studies.examples.paper import PLANTS
 
 SCHEDULES = ("held-out", "scenario")
-LAWS: Mapping[str, Any] = {"he": HeStiction, "kano": KanoStiction, "xch": XchStiction}
+LAWS = ("he", "kano", "xch")
 FIRST_HOLD = 20  # samples at the operating point
 MOVES = 5
 # Held-out set-points lie this far from the operating point at most; valves then stay well
@@ -95,7 +95,7 @@ class StudyOptions:
         for value, known, where in (
             (self.plant, PLANTS, "plant"),
             (self.schedule, SCHEDULES, "schedule"),
-            (self.law, tuple(LAWS), "law"),
+            (self.law, LAWS, "law"),
         ):
             if value not in known:
                 raise InputError(
@@ -259,8 +259,7 @@ def _plant(scenario: Scenario, options: StudyOptions) -> LoopModel:
 def _of_law(effect: Behaviour, law: str) -> Behaviour:
     if not isinstance(effect, HeStiction):
         return effect
-    made: Behaviour = LAWS[law].from_frictions(effect.static_friction, effect.dynamic_friction)
-    return made
+    return behaviour_of(law, (effect.static_friction, effect.dynamic_friction), {})
 
 
 def _controller(
@@ -282,7 +281,7 @@ def _controller(
         for valve in plant.valves
     ]
     if options.known is not None:
-        kind = LAWS[options.law]
-        frictions = [kind.from_frictions(*pair) if max(pair) else None for pair in options.known]
+        pairs = options.known
+        frictions = [behaviour_of(options.law, p, {}) if max(p) else None for p in pairs]
     known = [None if friction is None else FrictionSpread(0.0, 0.0) for friction in frictions]
     return MpcController(settings.design(scenario.process), column.mode, frictions, known)

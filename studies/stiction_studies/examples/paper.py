@@ -5,7 +5,7 @@ import dataclasses
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.identification.friction import laws
+from stiction_ros.identification.friction import behaviour_of, laws
 from stiction_ros.loop import LoopModel, SetPoints
 from stiction_ros.online.session import Scenario, run_live
 from stiction_ros.processes import NoiseEntry
@@ -43,7 +43,7 @@ def example1(
     plant = LoopModel.from_mapping(document)
     if law != "he":
         _check(law, tuple(laws()), "law")
-        plant = plant.with_valve_effects({"V1": [laws()[law].from_frictions(5.0, 2.0)]})
+        plant = plant.with_valve_effects({"V1": [behaviour_of(law, (5.0, 2.0), {})]})
     schedule = SetPoints.load(find_config("example1.set_points.yaml"), plant.outputs)
     schedule = dataclasses.replace(schedule, repeat=EXAMPLE1_SAMPLES * plant.sample_time)
     scenario = dataclasses.replace(scenario, plant=plant, set_points=schedule)

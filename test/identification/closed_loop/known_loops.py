@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects import FloatArray
-from stiction_ros.identification.friction import find_law
+from stiction_ros.identification.friction import behaviour_of
 from stiction_ros.identification.result import (
     FitStatus,
     Identification,
@@ -52,7 +52,7 @@ def known(
     noise = kind.noise * np.random.default_rng(seed).standard_normal(samples)
     outside = np.zeros(samples) if load is None else load
     wanted = np.full(samples, 20.0) if sp is None else sp
-    valve = find_law(kind.law).from_frictions(*kind.friction)
+    valve = behaviour_of(kind.law, kind.friction, {})
     y, pv, op, stem = np.zeros(samples), np.zeros(samples), np.zeros(samples), np.zeros(samples)
     start = -0.9 * kind.friction[0]  # no rest to stay in
     position, command, before = start, 0.0, 0.0

@@ -7,6 +7,7 @@ import pytest
 import simulated_loops as loops
 from evidence_loops import pi_loop
 
+from stiction_ros.effects import KanoStiction
 from stiction_ros.identification import Identification, IdentificationOptions, identify
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.laws import with_own_laws
@@ -19,7 +20,7 @@ from stiction_ros.records.record import Record
 @pytest.fixture(scope="module")
 def moving() -> Identification:
     """What is found of a loop whose valve goes on while OP goes on."""
-    valve = find_law("kano").from_frictions(5.0, 2.0)
+    valve = KanoStiction(7.0, 3.0)
     return identify(loops.example1(2, samples=700, valve=valve))
 
 

@@ -17,6 +17,7 @@ from stiction_ros.effects import (
     SmoothedHeStiction,
 )
 from stiction_ros.errors import InputError
+from stiction_ros.identification.friction import behaviour_of
 from stiction_ros.loop import LoopModel, Plant, SetPoints, ValveChange
 from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.controller.plans import thinned_plan
@@ -242,7 +243,7 @@ WORSE = process_of_gain(0.3).with_valve_effects({"V1": [HeStiction(5.0, 2.0)]})
 
 @pytest.mark.parametrize("law", [HeStiction, KanoStiction])
 def test_a_controller_that_is_worse_is_rolled_back(law: type[FrictionLaw]) -> None:
-    sticky = {"V1": [law.from_frictions(5.0, 2.0)]}
+    sticky = {"V1": [behaviour_of(str(law.law), (5.0, 2.0), {})]}
     run = Run(LiveController(watched(), PROCESS))
     run.plant = Plant(PLANT.with_valve_effects(sticky), 1)
     run.go(350)
@@ -678,7 +679,7 @@ def test_friction_beyond_the_travel_is_said_and_the_valve_left_alone() -> None:
 def test_a_valve_that_sticks_more_in_mid_run_is_found_by_the_slip_check(
     law: type[FrictionLaw],
 ) -> None:
-    before, after = law.from_frictions(5.0, 2.0), law.from_frictions(9.0, 2.0)
+    before, after = (behaviour_of(str(law.law), (static, 2.0), {}) for static in (5.0, 9.0))
     known = PROCESS.with_valve_effects({"V1": [before]})
     run = Run(LiveController(SETTINGS, known))
     sticky = PLANT.with_valve_effects({"V1": [before]})

@@ -15,6 +15,7 @@ from stiction_ros.effects import (
     XchStiction,
 )
 from stiction_ros.identification import OutputModel
+from stiction_ros.identification.friction import behaviour_of
 from stiction_ros.online.estimator.change_evidence import Evidence, OutputReference, Reference
 from stiction_ros.online.estimator.friction_change import (
     ChangeRule,
@@ -147,7 +148,7 @@ def test_a_valve_that_stays_where_it_should_have_moved_sticks_more(
 
 @pytest.mark.parametrize("kind", [KanoStiction, ChoudhuryStiction, XchStiction])
 def test_a_change_is_seen_by_the_law_that_is_trusted(kind: type[FrictionPair]) -> None:
-    old = kind.from_frictions(5.0, 2.0)
+    old = behaviour_of(str(kind.law), (5.0, 2.0), {})
     trusted = dataclasses.replace(TRUSTED, law=kind.law)
     op = kicks(5.5, 9.0, old=old)
     new = (old, None, old.with_frictions(7.5, 2.0))

@@ -127,7 +127,7 @@ def test_a_law_without_a_smoothed_form_is_refused() -> None:
 
 
 @pytest.mark.parametrize("away", [6.0, 12.0])
-@pytest.mark.parametrize("law", [KanoStiction.from_frictions(8.0, 1.0), XchStiction(8.0, 1.0)])
+@pytest.mark.parametrize("law", [KanoStiction(9.0, 7.0), XchStiction(8.0, 1.0)])
 def test_from_rest_other_laws_of_the_same_jumps_are_planned_alike(
     law: Behaviour, away: float
 ) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from stiction_ros.effects import Backlash, FrictionPair, SlipJumpPair, behaviours
+from stiction_ros.identification.friction import behaviour_of
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.events import ModeChange, Text
 from stiction_ros.records.run.log import RunLog
@@ -62,7 +63,7 @@ def test_the_friction_of_the_plant_is_told_whatever_its_law(log: RunLog, law: st
     assert story.truth is not None
     kind = next(kind for kind in behaviours() if kind.law == law)
     assert issubclass(kind, FrictionPair | SlipJumpPair)
-    truth = story.truth.with_valve_effects({"V1": (kind.from_frictions(5.0, 2.0),)})
+    truth = story.truth.with_valve_effects({"V1": (behaviour_of(law, (5.0, 2.0), {}),)})
     told = dataclasses.replace(story, truth=truth).true_friction("V1")
     assert told == pytest.approx((5.0, 2.0))
 
