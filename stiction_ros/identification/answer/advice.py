@@ -14,25 +14,16 @@ from stiction_ros.identification.result import FitStatus, Identification, ValveE
 from stiction_ros.records.record import Record
 from stiction_ros.texts import spoken
 
+# steps into which the largest band that is not rejected is divided, the first whose answers PV's
+# noise does not hide: the band is then known to a quarter, which tells a valve to service from one
+# to leave, or to a half, or it shows as a first step back that PV does not answer
 STEPS = (4, 2, 1)
-"""Steps into which the largest band that is not rejected is divided, the first whose answers PV's
-noise does not hide: the band is then known to a quarter, which tells a valve to service from one to
-leave, or to a half, or it shows as a first step back that PV does not answer."""
-
+# samples of a hold that are averaged at most: beyond that loads move PV, so it is repeated
 AVERAGED = 60
-"""Samples of a hold that are averaged at most: beyond that loads move PV, so it is repeated."""
-
-HELD = 3.0
-"""Lags for which a step is held: by then PV shows 95 % of it."""
-
-INTEGRATED = 20
-"""Samples for which a step is held where PV does not settle."""
-
-CLEAR = 4.0
-"""Standard deviations of PV's noise that the answer to a step must make."""
-
-CENTRED = 1e-3
-"""Share of OP's range below which its mean is what a computer leaves of 0."""
+HELD = 3.0  # lags for which a step is held: by then PV shows 95 % of it
+INTEGRATED = 20  # samples for which a step is held where PV does not settle
+CLEAR = 4.0  # standard deviations of PV's noise that the answer to a step must make
+CENTRED = 1e-3  # share of OP's range below which its mean is what a computer leaves of 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,6 +36,10 @@ class Expected:
     why: str  # half a sentence
 
 
+# limits that hold for nearly all loops of a kind: qualities after the guidelines of Seborg, Edgar,
+# Mellichamp, Process Dynamics and Control, chapter 12 (flow and liquid pressure fast and settling;
+# level and gas pressure integrating; temperature and composition slow); the figures are decades
+# beyond what is usual, so that only what cannot be is contradicted
 EXPECTED: Mapping[str, Expected] = {
     "flow": Expected(
         0.0, 60.0, True, "a flow follows its valve and a damped transmitter within a minute"
@@ -60,10 +55,6 @@ EXPECTED: Mapping[str, Expected] = {
         10.0, 14400.0, None, "a sample line and a mixed vessel take from 10 s to hours"
     ),
 }
-"""Limits that hold for nearly all loops of a kind: qualities after the guidelines of Seborg, Edgar,
-Mellichamp, Process Dynamics and Control, chapter 12 (flow and liquid pressure fast and settling;
-level and gas pressure integrating; temperature and composition slow); the figures are decades
-beyond what is usual, so that only what cannot be is contradicted."""
 
 
 def advised(

@@ -8,12 +8,10 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.result import OutputModel
 from stiction_ros.signals.free_run import step_response
 
-RISEN = 0.632
-"""Share of the whole answer that a first-order process has given after one lag."""
-
+RISEN = 0.632  # share of the whole answer that a first-order process has given after one lag
+# times by which an answer that does not settle grows from a quarter of the record to its half: 2
+# for an integrator, 1.4 for a lag of a quarter of the record, 1.6 for one of a half
 GROWS = 1.5
-"""Times by which an answer that does not settle grows from a quarter of the record to its half:
-2 for an integrator, 1.4 for a lag of a quarter of the record, 1.6 for one of a half."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,20 +16,16 @@ from stiction_ros.identification.result import (
 )
 from stiction_ros.texts import plural, probability, spoken
 
-WIDTH = 80
-"""Columns of a terminal."""
-
-NOTES = 3
-"""Notes that a summary shows."""
-
+WIDTH = 80  # columns of a terminal
+NOTES = 3  # notes that a summary shows
 HEAD = ("valve", "verdict", "P", "f_S, %", "interval", "f_D, %", "interval")
+# what to do about a cycle that the valve does not make
 CAUSES: Mapping[CauseKind, str] = {
     CauseKind.TUNING: "retune the controller: it rings with the process",
     CauseKind.DISTURBANCE: "look upstream for what comes in with this period",
     CauseKind.SET_POINT: "look at what moves the set-point with this period",
     CauseKind.UNKNOWN: "look at the neighbouring loops: nothing found here explains the cycle",
 }
-"""What to do about a cycle that the valve does not make."""
 
 
 def summary(found: Identification) -> str:

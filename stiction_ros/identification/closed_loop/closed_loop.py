@@ -26,14 +26,9 @@ from stiction_ros.signals.recovered_controller import (
     RecoveredController,
 )
 
-UNSEEN_CYCLES = 10
-"""Cycles that a record without an oscillation is taken to have room for."""
-
-SPAN_SHARE = 3.0
-"""Spans of the controller's fit go up to the period over this."""
-
-LONG_HOLD = 0.5
-"""Share of the longest stretch that the longest hold of the set-point must have."""
+UNSEEN_CYCLES = 10  # cycles that a record without an oscillation is taken to have room for
+SPAN_SHARE = 3.0  # spans of the controller's fit go up to the period over this
+LONG_HOLD = 0.5  # share of the longest stretch that the longest hold of the set-point must have
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,60 +8,37 @@ from stiction_ros.loop.linear_loops import Ringing
 from stiction_ros.records.record import Record
 from stiction_ros.signals.oscillation import REGULAR
 
-ENDLESS = 1e6
-"""Stands in the figures for a movement that grows without end."""
-
+ENDLESS = 1e6  # stands in the figures for a movement that grows without end
+# share of OP's movement that must go away with the friction for the valve to be the cause
 MATERIAL = 0.15
-"""Share of OP's movement that must go away with the friction for the valve to be the cause."""
-
+# the same of a friction that was not found, where nothing else explains the oscillation
 LEFT_OVER = 0.25
-"""The same of a friction that was not found, where nothing else explains the oscillation."""
-
-MANY_TIMES = 3.0
-"""Movement over the recorded one from which on a repeated loop is another one."""
-
+MANY_TIMES = 3.0  # movement over the recorded one from which on a repeated loop is another one
+# BIC gain from which on a line from outside is believed: strong evidence by Kass and Raftery
 LINE = 6.0
-"""BIC gain from which on a line from outside is believed: strong evidence by Kass and Raftery."""
-
+# BIC gain of a line alone over that of the friction from which on the friction may be fitted to a
+# wave from outside. Of valves that make their loop cycle it is below 0: no clock follows slips
 RIVAL = 0.3
-"""BIC gain of a line alone over that of the friction from which on the friction may be fitted to a
-wave from outside. Of valves that make their loop cycle it is below 0: no clock follows slips."""
-
+# BIC gain from which on a line shows an oscillation that is too short or too faint to be regular by
+# its autocorrelation
 PLAIN_LINE = 60.0
-"""BIC gain from which on a line shows an oscillation that is too short or too faint to be regular
-by its autocorrelation."""
-
+# share of the variance from which on a line is an oscillation though it has too few cycles for a
+# regularity
 PLAIN_SHARE = 0.5
-"""Share of the variance from which on a line is an oscillation though it has too few cycles for a
-regularity."""
-
-FAINT = 0.05
-"""Share of the variance below which a line that nothing explains is no oscillation."""
-
-DRIVEN = 0.5
-"""Share of the cycle, of PV and of OP, that the set-point must make to be the cause."""
-
+FAINT = 0.05  # share of the variance below which a line that nothing explains is no oscillation
+DRIVEN = 0.5  # share of the cycle, of PV and of OP, that the set-point must make to be the cause
+# share of PV's line that the line of a set-point that cycles must have to be the cause however
+# regular PV is, and whatever the model says that it moves
 FOLLOWED = 0.75
-"""Share of PV's line that the line of a set-point that cycles must have to be the cause however
-regular PV is, and whatever the model says that it moves."""
-
+# share of OP's movement that moves of the set-point without a line must make to be the cause
 ALL_DRIVEN = 0.9
-"""Share of OP's movement that moves of the set-point without a line must make to be the cause."""
-
-OPEN = 0.9
-"""R² of the controller below which an unrecorded set-point may move OP."""
-
-HALF_OPEN = 0.95
-"""The same where the line shows more clearly in OP than in PV."""
-
+OPEN = 0.9  # R² of the controller below which an unrecorded set-point may move OP
+HALF_OPEN = 0.95  # the same where the line shows more clearly in OP than in PV
+# share of an oscillation left after a period: a quarter is usual tuning, half of it rings long
 RINGING = 0.5
-"""Share of an oscillation left after a period: a quarter is usual tuning, half of it rings long."""
-
+# the same of the process beside a wave, from which on the loop makes the wave itself
 STILL_RINGING = 0.85
-"""The same of the process beside a wave, from which on the loop makes the wave itself."""
-
-SAME_PERIOD = 1.3
-"""Factor within which the loop rings at the period of the oscillation."""
+SAME_PERIOD = 1.3  # factor within which the loop rings at the period of the oscillation
 
 
 def explained(record: Record, found: Identification, closed: ClosedLoop) -> Identification:

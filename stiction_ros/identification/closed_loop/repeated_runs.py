@@ -15,20 +15,11 @@ from stiction_ros.loop.linear_loops import Controllers, Pairs, Process, Runs, ru
 from stiction_ros.signals.oscillation import REGULAR, moving, oscillation, size
 from stiction_ros.signals.spectral_lines import fitted_lines
 
-MOST = 6000
-"""Samples of a run."""
-
-NOISES = 3
-"""Noises drawn for each friction when a record is repeated."""
-
-LINES = 3
-"""Harmonics of a cycle that are taken out of what the model leaves."""
-
-SEED = 20
-"""Of the noises: the same record gives the same answer."""
-
-DOUBTED = 0.7
-"""Share of the friction that is tried as its least where the interval begins at none."""
+MOST = 6000  # samples of a run
+NOISES = 3  # noises drawn for each friction when a record is repeated
+LINES = 3  # harmonics of a cycle that are taken out of what the model leaves
+SEED = 20  # of the noises: the same record gives the same answer
+DOUBTED = 0.7  # share of the friction that is tried as its least where the interval begins at none
 
 
 def law_of(valve: ValveEstimate) -> tuple[float, float, float]:

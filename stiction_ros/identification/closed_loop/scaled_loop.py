@@ -15,14 +15,12 @@ from stiction_ros.records.record import Record
 from stiction_ros.signals.free_run import driven
 from stiction_ros.signals.polynomials import recursion
 
+# decimals that are kept of scaled numbers: a valve that slips a sample later for the last bits of a
+# unit would make another run of it, and with it another verdict
 DIGITS = 7
-"""Decimals that are kept of scaled numbers: a valve that slips a sample later for the last bits of
-a unit would make another run of it, and with it another verdict."""
-EXACT = 9
-"""Decimals where a run has to repeat the record: frictions lie as close to what OP passes."""
-
+EXACT = 9  # decimals where a run has to repeat the record: frictions lie as close to what OP passes
+# samples of a record that are looked at: thousands of cycles say no more than hundreds
 LONGEST = 20_000
-"""Samples of a record that are looked at: thousands of cycles say no more than hundreds."""
 
 
 @dataclasses.dataclass(frozen=True)

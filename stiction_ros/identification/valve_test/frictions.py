@@ -10,16 +10,14 @@ from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
 from stiction_ros.identification.valve_test.steps import Steps
 
+# smallest f_S of interest, %: a valve with less follows its signal as good positioners do
 SMALLEST = 0.4
-"""Smallest f_S of interest, %: a valve with less follows its signal as good positioners do."""
-LARGEST = 15.0
-"""Largest f_S of all, %."""
+LARGEST = 15.0  # largest f_S of all, %
+# cells over log f_S, f_D / f_S and the start, before they are refined: a stem near the edge of its
+# band slips at the first small move, which coarser starts would miss for a large f_S
 CELLS = (30, 8, 20)
-"""Cells over log f_S, f_D / f_S and the start, before they are refined: a stem near the edge of its
-band slips at the first small move, which coarser starts would miss for a large f_S."""
 RAMP = 12  # parts of a step behind an actuator's lag
-LEVELS = 5
-"""Times that cells are halved: the last ones are .6 % of f_S wide."""
+LEVELS = 5  # times that cells are halved: the last ones are .6 % of f_S wide
 REFINED = 64  # sets of moves of which the cells are halved at once
 KEPT = 3000  # likeliest cells that are kept besides
 

@@ -14,19 +14,16 @@ from stiction_ros.identification.valve_test.frictions import LEVELS, Frictions
 from stiction_ros.identification.valve_test.likelihood import Answered, Dynamics, Shape, log_sum
 from stiction_ros.identification.valve_test.steps import Steps
 
-EVALUATIONS = 150
-"""Of a search over process and noise."""
-DRAWS = 64
-"""Of process and noise, over which the evidence is averaged."""
-CURVED = 0.1
-"""Share of the width of the prior by which the evidence is differenced."""
+EVALUATIONS = 150  # of a search over process and noise
+DRAWS = 64  # of process and noise, over which the evidence is averaged
+CURVED = 0.1  # share of the width of the prior by which the evidence is differenced
+# first steps of a search over the width of the prior: from its middle, and from a former end
 COLD, WARM = 0.7, 0.3
-"""First steps of a search over the width of the prior: from its middle, and from a former end."""
 UNSHOWN = 1e-3  # least share of a step that PV is taken to show within a hold
 START = Dynamics(lag=-0.5, second=-1.0, dead=-1.5, load=-5.0, kept=0.0, noise=-2.0)
+# middle and standard deviation of the prior of process and noise, weak as they are known to a
+# decade or so: a hold lasts for a dead time and one or two lags, a load moves less than noise
 WIDE = Dynamics(lag=1.7, second=1.5, dead=1.0, load=2.0, kept=1.5, noise=2.0)
-"""Middle and standard deviation of the prior of process and noise, weak as they are known to a
-decade or so: a hold lasts for a dead time and one or two lags, a load moves less than noise."""
 
 
 @dataclasses.dataclass(frozen=True)
