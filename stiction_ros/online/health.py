@@ -1,6 +1,5 @@
 """What a node has noticed, shown long enough to be seen and no longer than it lasts."""
 
-import dataclasses
 from collections.abc import Callable
 
 LEVELS = ("ok", "warn", "error")
@@ -10,13 +9,6 @@ SHOWN = 2.5  # s after the last time, so that a status at 1 Hz tells of it twice
 def stopped_after(period: float) -> float:
     """Return the silence, s, after which a loop of this wall time per sample has stopped."""
     return max(3.0 * period, 0.5)
-
-
-@dataclasses.dataclass
-class _Noticed:
-    level: str
-    text: str
-    until: float
 
 
 class Noticed:
@@ -29,28 +21,26 @@ class Noticed:
 
     def __init__(self, clock: Callable[[], float], shown: float = SHOWN) -> None:
         self._clock, self._shown = clock, shown
-        self._found: dict[str, _Noticed] = {}
+        self._found: dict[str, tuple[str, str, float]] = {}  # level, text, and until when
 
     def notice(self, name: str, level: str, text: str) -> bool:
         """Note ``name`` (again) with ``level`` warn or error; tell whether it is new."""
         new = name not in self._current()
-        self._found[name] = _Noticed(level, text, self._clock() + self._shown)
+        self._found[name] = level, text, self._clock() + self._shown
         return new
 
     @property
     def level(self) -> str:
         """The worst level in force: ok, warn or error."""
-        found = [noticed.level for noticed in self._current().values()]
-        return max(found, key=LEVELS.index, default="ok")
+        return max((one[0] for one in self._current().values()), key=LEVELS.index, default="ok")
 
     @property
     def text(self) -> str:
         """All that is in force, the worst first; empty for nothing."""
-        rank = LEVELS.index
-        found = sorted(self._current().values(), key=lambda one: -rank(one.level))
-        return "; ".join(noticed.text for noticed in found)
+        found = sorted(self._current().values(), key=lambda one: -LEVELS.index(one[0]))
+        return "; ".join(text for _, text, _ in found)
 
-    def _current(self) -> dict[str, _Noticed]:
+    def _current(self) -> dict[str, tuple[str, str, float]]:
         now = self._clock()
-        self._found = {n: noticed for n, noticed in self._found.items() if noticed.until > now}
+        self._found = {name: one for name, one in self._found.items() if one[2] > now}
         return self._found

@@ -62,11 +62,6 @@ def standing(old: GapFinding | None, new: GapFinding) -> GapFinding:
     return old if old is not None and silent else new
 
 
-def unusable(begin: int, end: int, reason: str) -> GapFinding:
-    """Return what is said of a window on which the workflow failed."""
-    return GapFinding(begin, end, None, f"window not usable: {reason}", (), {})
-
-
 def _sentence(found: discrepancy.Discrepancy, effects: Sequence[str]) -> str:
     if found.verdict is discrepancy.GapVerdict.NONE:
         return "no effect of the catalogue is found"

@@ -10,7 +10,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator
 from stiction_ros.online.handover.hand_over import AtOnce
-from stiction_ros.online.monitor.gap_finding import GapFinding, find_in_window, standing, unusable
+from stiction_ros.online.monitor.gap_finding import GapFinding, find_in_window, standing
 from stiction_ros.online.monitor.gap_monitor import GapLook, GapMonitor, MonitorRule
 
 Submit = Callable[..., "Future[Any]"]
@@ -156,7 +156,8 @@ class Monitoring:
                 continue
             except Exception as error:  # one window that fails must not end the estimator
                 said = str(error) if isinstance(error, InputError) else repr(error)
-                new = unusable(look.begin, look.end, said)
+                said = f"window not usable: {said}"
+                new = GapFinding(look.begin, look.end, None, said, (), {})
             self.runs += 1
             self.finding = standing(self.finding, new)
             found.append(new)

@@ -13,12 +13,20 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.bag.run_metadata import mapping_of
 from stiction_ros.records.run.bag_runs import tell_runs
-from stiction_ros.records.run.events import Fit, GapLog, ModeChange, fits, gap_log, mode_changes
+from stiction_ros.records.run.events import (
+    DIAGNOSTICS,
+    STRING,
+    Fit,
+    GapLog,
+    ModeChange,
+    fits,
+    gap_log,
+    mode_changes,
+    on_topic,
+)
 from stiction_ros.records.run.loop_signals import JOINT_STATE, LoopSignals
 from stiction_ros.records.storage.bag_metadata import BagTopic
 
-DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
-STRING = "std_msgs/msg/String"
 PARAMETER_EVENT = "rcl_interfaces/msg/ParameterEvent"
 _INPUTS = ("pv", "op", "op_applied", "sp", "dv")
 _TEXTS = ("config", "loop_model")
@@ -189,9 +197,7 @@ def _signals(messages: Iterable[BagMessage]) -> Iterator[Signal]:
 
 
 def _published_fits(messages: Iterable[BagMessage]) -> Iterator[tuple[int, PublishedFit]]:
-    for message in messages:
-        if message.type != JOINT_STATE or last_part(message.topic)[1] != "stiction":
-            continue
+    for message in on_topic(messages, JOINT_STATE, "stiction"):
         state = message.message
         if state.header.frame_id == ControlMode.VALVE_TEST:
             continue  # no fit
@@ -219,9 +225,7 @@ def _models(messages: Iterable[BagMessage]) -> Iterator[PublishedModel]:
 def _configs(messages: Iterable[BagMessage], space: str, notes: list[str]) -> dict[str, NodeConfig]:
     """Return the configurations of estimator and controller, told apart by their parameters."""
     found: dict[str, NodeConfig] = {}
-    for message in messages:
-        if message.type != STRING or last_part(message.topic)[1] != "config":
-            continue
+    for message in on_topic(messages, STRING, "config"):
         document = mapping_of(str(message.message.data))
         parameters, model = document.get("parameters"), document.get("model")
         if not isinstance(parameters, dict):

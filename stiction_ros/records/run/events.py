@@ -7,7 +7,7 @@ import math
 import types
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,8 +17,8 @@ from stiction_ros.records.record import Record
 from stiction_ros.records.run.loop_signals import JOINT_STATE
 from stiction_ros.records.storage.bag_metadata import BagTopic
 
-_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
-_STRING = "std_msgs/msg/String"
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+STRING = "std_msgs/msg/String"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 FIGURES = ("p50", "p99", "p999", "max")
 
@@ -71,14 +71,6 @@ class GapLog:
     findings: Mapping[int, Mapping[str, Any]]  # documents of what the workflow found
 
 
-class _Status(NamedTuple):
-    """One diagnostic status: its stamp in ns, the node that gave it, and its keys."""
-
-    stamp: int
-    node: str
-    values: Mapping[str, str]
-
-
 def of_loop(messages: Iterable[BagMessage], space: str) -> list[BagMessage]:
     """Return the messages of the loop in the namespace ``space``.
 
@@ -105,7 +97,7 @@ def node_of(status: Any) -> str:
 def estimates(messages: Iterable[BagMessage]) -> tuple[Estimate, ...]:
     """Return the estimates on ``stiction`` in their order."""
     found = []
-    for message in _of(messages, JOINT_STATE, "stiction"):
+    for message in on_topic(messages, JOINT_STATE, "stiction"):
         state = message.message
         stamp = stamp_ns(state)
         for index, (name, value) in enumerate(zip(state.name, state.position, strict=False)):
@@ -178,7 +170,7 @@ def stem_estimate(messages: Iterable[BagMessage], record: Record, start: int) ->
     """
     found = np.full((len(record), len(record.valves)), np.nan)
     told = False
-    for message in _of(messages, _TRAJECTORY, "prediction"):
+    for message in on_topic(messages, _TRAJECTORY, "prediction"):
         plan = message.message
         if not plan.points:
             continue
@@ -224,7 +216,7 @@ def texts(messages: Iterable[BagMessage], name: str) -> tuple[Text, ...]:
     """Return the strings on topics whose last part is ``name``."""
     return tuple(
         Text(message.topic, message.log_time, str(message.message.data))
-        for message in _of(messages, _STRING, name)
+        for message in on_topic(messages, STRING, name)
     )
 
 
@@ -250,20 +242,20 @@ def tells_of_run(topic: BagTopic) -> bool:
     name = last_part(topic.name)[1]
     return (topic.type, name) in {
         (JOINT_STATE, "stiction"),
-        (_DIAGNOSTICS, "diagnostics"),
+        (DIAGNOSTICS, "diagnostics"),
         (_TRAJECTORY, "prediction"),
-        (_STRING, "mode"),
-        (_STRING, "loop_model"),
-        (_STRING, "config"),
+        (STRING, "mode"),
+        (STRING, "loop_model"),
+        (STRING, "config"),
     }
 
 
-def _statuses(messages: Iterable[BagMessage]) -> Iterator[_Status]:
-    """Yield what ``/diagnostics`` tells."""
-    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
+def _statuses(messages: Iterable[BagMessage]) -> Iterator[tuple[int, str, Mapping[str, str]]]:
+    """Yield stamp in ns, node and keys of each status in ``/diagnostics``."""
+    for message in on_topic(messages, DIAGNOSTICS, "diagnostics"):
         for status in message.message.status:
             values = {str(item.key): str(item.value) for item in status.values}
-            yield _Status(stamp_ns(message.message), node_of(status), values)
+            yield stamp_ns(message.message), node_of(status), values
 
 
 def _documents(
@@ -280,5 +272,6 @@ def _documents(
             yield int(end), values, document
 
 
-def _of(messages: Iterable[BagMessage], type_name: str, name: str) -> Iterable[BagMessage]:
+def on_topic(messages: Iterable[BagMessage], type_name: str, name: str) -> Iterable[BagMessage]:
+    """Return the messages of a type on topics whose last part is ``name``."""
     return (m for m in messages if m.type == type_name and last_part(m.topic)[1] == name)

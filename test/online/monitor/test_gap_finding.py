@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from monitored_loops import ONSET, loop, record, shifted, sticky
 
 from stiction_ros.discrepancy import GapVerdict
-from stiction_ros.online.monitor.gap_finding import GapFinding, find_in_window, standing, unusable
+from stiction_ros.online.monitor.gap_finding import GapFinding, find_in_window, standing
 from stiction_ros.texts import json_text
 
 
@@ -70,9 +70,8 @@ def test_a_healthy_window_names_nothing() -> None:
     assert found.text == "no effect of the catalogue is found"
 
 
-def test_a_window_that_failed_says_why() -> None:
-    found = unusable(3, 9, "too short")
-    assert found.text == "window not usable: too short"
+def test_a_window_that_failed_is_unusable() -> None:
+    found = GapFinding(3, 9, None, "window not usable: too short", (), {})
     assert found.to_dict()["verdict"] == "unusable"
 
 
