@@ -188,13 +188,7 @@ def _gaps(found: "Discrepancy") -> Table:
     for head in ("output", "free run", "after", "noise", "one step", "after", "noise"):
         table.add_column(head, justify="left" if head == "output" else "right")
     for before, after in zip(found.before, found.after, strict=True):
-        table.add_row(
-            before.name,
-            f"{before.free_run_rmse:.4g}",
-            f"{after.free_run_rmse:.4g}",
-            f"{after.floor_free_run:.4g}",
-            f"{before.one_step_rmse:.4g}",
-            f"{after.one_step_rmse:.4g}",
-            f"{after.floor_one_step:.4g}",
-        )
+        free = before.free_run_rmse, after.free_run_rmse, after.floor_free_run
+        ahead = before.one_step_rmse, after.one_step_rmse, after.floor_one_step
+        table.add_row(before.name, *(f"{value:.4g}" for value in (*free, *ahead)))
     return table

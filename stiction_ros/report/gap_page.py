@@ -1,14 +1,13 @@
 """The report of a discrepancy: the gap before and after, what names the effect, the rivals."""
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapVerdict, Look
 from stiction_ros.discrepancy.gap.measure import levelled
-from stiction_ros.pages.frame import framed, text
+from stiction_ros.pages.frame import framed, listed, text
 from stiction_ros.pages.plot import SCRIPT, Curve, over_time
 from stiction_ros.report import gap_words as say
 from stiction_ros.report.page import Cell, card, folded, number, table, write_page
@@ -53,13 +52,13 @@ def gap_page(found: Discrepancy) -> str:
     ]
     changes = change_lines(found)
     if changes:
-        parts.append("<h2>What of the process was changed</h2>" + _listed(changes))
+        parts.append("<h2>What of the process was changed</h2>" + listed(changes))
     for k, look in enumerate(found.looks):
         parts += _look(found, look, k)
     parts += ["<h2>What these records could not show</h2>" + _untestable(found)]
-    listed = [f"{entry.name}: {entry.reason}" for entry in found.not_considered]
-    if listed:
-        parts.append("<h2>What was not considered</h2>" + _listed(listed))
+    if found.not_considered:
+        left = (f"{entry.name}: {entry.reason}" for entry in found.not_considered)
+        parts.append("<h2>What was not considered</h2>" + listed(left))
     parts += [folded("The loop model with what was found", found.model_after.to_yaml())]
     return framed(f"{names}: {headline}", parts, SCRIPT)
 
@@ -101,11 +100,7 @@ def _noise(found: Discrepancy) -> str:
             f"{each.name}: innovations of {number(each.found)}, {agrees} the model declares "
             f"({number(each.declared)}{seen})"
         )
-    return _listed(lines)
-
-
-def _listed(lines: Sequence[str]) -> str:
-    return "<ul>" + "".join(f"<li>{text(line)}</li>" for line in lines) + "</ul>"
+    return listed(lines)
 
 
 def _gate(found: Discrepancy) -> str:
@@ -124,30 +119,22 @@ def _gate(found: Discrepancy) -> str:
         lines.append(f"set-point moves: {moves}")
     lines.append(say.CONTROLLER[found.controller.status])
     lines += found.notes
-    return _listed(lines)
+    return listed(lines)
 
 
 def _gaps(found: Discrepancy) -> str:
     rows: list[list[Cell]] = []
     for before, after in zip(found.before, found.after, strict=True):
-        rows.append(
-            [
-                before.name,
-                number(before.free_run_rmse),
-                number(after.free_run_rmse),
-                number(after.floor_free_run),
-                number(before.one_step_rmse),
-                number(after.one_step_rmse),
-                number(after.floor_one_step),
-            ]
-        )
+        free = before.free_run_rmse, after.free_run_rmse, after.floor_free_run
+        ahead = before.one_step_rmse, after.one_step_rmse, after.floor_one_step
+        rows.append([before.name, *map(number, (*free, *ahead))])
     head = ("output", "free run before", "after", "noise", "one step before", "after", "noise")
     closed = f"<p>{100.0 * found.closed:.0f} % of the free-run excess over the noise is gone "
     return table(head, rows) + closed + "on samples that were not used for the fit.</p>"
 
 
 def _look(found: Discrepancy, look: Look, k: int) -> list[str]:
-    listed = "".join(f"<li>{text(say.plain(said))}</li>" for said in look.where.sentences)
+    where = listed(map(say.plain, look.where.sentences)) if look.where.sentences else ""
     rows: list[list[Cell]] = []
     for fit in look.scores.fits:
         outside = "" if fit.candidate.inside else ", outside the catalogue"
@@ -166,7 +153,7 @@ def _look(found: Discrepancy, look: Look, k: int) -> list[str]:
         after = "nothing is added"
     return [
         f"<h2>Look {k + 1}: where the gap is</h2>",
-        f"<ul>{listed}</ul>" if listed else "<p>At no particular time or place.</p>",
+        where or "<p>At no particular time or place.</p>",
         _tracks(found, look),
         f"<h2>Look {k + 1}: the candidates</h2>",
         f"<p>{text(said)}; {text(say.plain(after))}.</p>",

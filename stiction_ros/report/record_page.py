@@ -9,7 +9,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, ValveEstimate
 from stiction_ros.identification.answer.summary import cycle, materiality, next_step, why
 from stiction_ros.identification.judgement import definitions
-from stiction_ros.pages.frame import framed, text, words
+from stiction_ros.pages.frame import framed, listed, text, words
 from stiction_ros.pages.plot import SCRIPT, Curve, over_time
 from stiction_ros.pages.signals import UNITS, all_signals, close_look
 from stiction_ros.records.parts import joined, span
@@ -61,7 +61,6 @@ def record_page(
             f'<p class="note warn">The fit is not to be trusted: {text(identification.reason)}</p>'
         )
     notes = dict.fromkeys([*record.notes, *identification.notes])
-    listed = "".join(f"<li>{text(note)}</li>" for note in notes)
     whole = (joined(parts) if parts else record).filled()
     stem = _stem_within(record, identification, joined(parts) if parts else record)
     sections = [
@@ -77,7 +76,7 @@ def record_page(
         evidence_table(identification.valves),
         process_table(found["outputs"], record.sample_time),
         responses(found["outputs"], record, UNITS, None),
-        f"<h2>Notes</h2><ul>{listed}</ul>" if notes else "",
+        f"<h2>Notes</h2>{listed(notes)}" if notes else "",
     ]
     return framed(f"{record.name}: {headline}", sections, SCRIPT)
 

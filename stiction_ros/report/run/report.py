@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from stiction_ros.online.session import Scenario
-from stiction_ros.pages.frame import framed, text, words
+from stiction_ros.pages.frame import framed, listed, text, words
 from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.events import ModeChange
 from stiction_ros.records.run.log import RunLog
@@ -304,9 +304,7 @@ def _configuration(story: Story) -> str:
 
 def _notes(story: Story) -> str:
     notes = [*story.log.notes, *story.identified.get("model", {}).get("notes", [])]
-    if not notes:
-        return ""
-    return "<h2>Notes</h2><ul>" + "".join(f"<li>{text(note)}</li>" for note in notes) + "</ul>"
+    return f"<h2>Notes</h2>{listed(notes)}" if notes else ""
 
 
 def monitor_section(log: RunLog) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.pages.words import period, signed_percent
 from stiction_ros.survey.survey import Survey
+from stiction_ros.texts import plural
 
 NAMED = 8  # loops that a sentence lists
 HEADS = {
@@ -59,18 +60,18 @@ def headline(survey: Survey) -> str:
     found = sum(entry.found for entry in survey.entries)
     if count and not judged:
         return f"{count} of {count} could not be judged"
-    first = f"{found} valve{'s' * (found != 1)} to look at" if found else "No valve found"
+    first = f"{plural(found, 'valve')} to look at" if found else "No valve found"
     rest = f"; {count - judged} could not be judged" if judged < count else ""
-    return f"{first} among {loops(count)}{rest}"
+    return f"{first} among {plural(count, 'loop')}{rest}"
 
 
 def worked(survey: Survey) -> str:
     """Return how many loops were done in which time, and how many of them were done before."""
-    count, seconds = len(survey.entries), period(survey.seconds)
+    loops, seconds = plural(len(survey.entries), "loop"), period(survey.seconds)
     if not survey.before:
-        return f"{loops(count)} in {seconds}"
-    here = count - survey.before
-    return f"{loops(count)}, {here} of them in this run in {seconds} and {survey.before} before"
+        return f"{loops} in {seconds}"
+    here = len(survey.entries) - survey.before
+    return f"{loops}, {here} of them in this run in {seconds} and {survey.before} before"
 
 
 def changed(entries: Sequence[Entry], earlier: Sequence[Earlier]) -> list[str]:
@@ -87,11 +88,6 @@ def changed(entries: Sequence[Entry], earlier: Sequence[Earlier]) -> list[str]:
 def kind_of(entry: Entry) -> str:
     """Return the verdict of a loop that was judged, the status of another one."""
     return (entry.verdict or "") if entry.status is Status.OK else entry.status.value
-
-
-def loops(count: int) -> str:
-    """Return a number of loops in words."""
-    return f"{count} loop{'s' * (count != 1)}"
 
 
 def _listed(names: Sequence[str]) -> str:

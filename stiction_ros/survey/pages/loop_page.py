@@ -6,7 +6,7 @@ from typing import Any
 from stiction_ros.gain.advice import advice
 from stiction_ros.identification import Identification
 from stiction_ros.identification.answer.summary import materiality, next_step, why
-from stiction_ros.pages.frame import card, framed, text, words
+from stiction_ros.pages.frame import card, framed, listed, text, words
 from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.pages.signals import Units, all_signals, close_look
 from stiction_ros.records.record import Record
@@ -131,6 +131,5 @@ def _span(record: Record) -> str:
 
 def _notes(entry: Entry) -> str:
     files = ", ".join(entry.files)
-    notes = "".join(f"<li>{text(note)}</li>" for note in entry.notes)
-    listed = f"<ul>{notes}</ul>" if notes else ""
-    return f"<h2>Notes</h2><p class='soft'>Read from {text(files)}.</p>{listed}"
+    notes = listed(entry.notes) if entry.notes else ""
+    return f"<h2>Notes</h2><p class='soft'>Read from {text(files)}.</p>{notes}"
