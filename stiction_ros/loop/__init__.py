@@ -2,7 +2,6 @@
 
 from stiction_ros.loop.closed_loop import ClosedLoopRun as ClosedLoopRun
 from stiction_ros.loop.closed_loop import PiController as PiController
-from stiction_ros.loop.closed_loop import PiControllers as PiControllers
 from stiction_ros.loop.closed_loop import simulate as simulate
 from stiction_ros.loop.closed_loop import simulate_closed_loop as simulate_closed_loop
 from stiction_ros.loop.excitation import prbs_experiment as prbs_experiment

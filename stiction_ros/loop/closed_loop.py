@@ -111,22 +111,6 @@ class PiController:
         return np.array([self._op])
 
 
-class PiControllers:
-    """One PI controller per output, each with its own valve."""
-
-    def __init__(self, controllers: Sequence[PiController]) -> None:
-        self._controllers = tuple(controllers)
-
-    def __call__(self, measurement: Measurement, sp: FloatArray) -> FloatArray:
-        parts = [
-            controller(
-                dataclasses.replace(measurement, pv=measurement.pv[i : i + 1]), sp[i : i + 1]
-            )
-            for i, controller in enumerate(self._controllers)
-        ]
-        return np.concatenate(parts)
-
-
 def own_controller(model: LoopModel) -> PiController:
     """Return the controller that ``model`` records, at rest at the loop's starting point."""
     if model.controller is None:

@@ -6,10 +6,9 @@ at once.
 
 from stiction_ros.cli.shared.searches import METHODS
 
-COUNTED = METHODS
-"""Methods that ``stiction paper --success`` counts."""
-
+COUNTED = METHODS  # methods that ``stiction paper --success`` counts
 FIGURES = (2, 3, 5, 6)  # 1 and 4 are schemes
+# exhibits of the paper
 TABLES = (
     "1",
     "2",
@@ -22,31 +21,21 @@ TABLES = (
     "ablation",
     "identified",
 )
-"""Exhibits of the paper."""
-
-NOISES = ("measurement", "equation")
-"""Where noise enters Example 1."""
-
-PLANTS = ("linear", "tank")
-"""Plants of Example 2."""
-
-HEALTHY = ("tight", "sine", "coloured")
-"""Why a loop without friction oscillates."""
-
+NOISES = ("measurement", "equation")  # where noise enters Example 1
+PLANTS = ("linear", "tank")  # plants of Example 2
+HEALTHY = ("tight", "sine", "coloured")  # why a loop without friction oscillates
 PRESETS = ("own", "corrected", "printed")
 WARM_STARTS = ("compensation", "search", "none")
 PROGRAMME_COSTS = ("revised", "plain")
 PRINTED_LAWS = ("he", "kano", "xch")
 SCHEDULES = ("held-out", "scenario")
 BLIND_FAMILIES = ("single", "two", "outside")
+# the family of loops of the field whose friction is by the mechanics of the stem
 PHYSICS = "physics"
-"""The family of loops of the field whose friction is by the mechanics of the stem."""
-
-PROCESS = "process"
-"""The family of loops whose model has one figure of the process wrong."""
-
+PROCESS = "process"  # the family of loops whose model has one figure of the process wrong
 GIVEN = ("exact", "off")
 
+# what is not as known in ``study-control``
 CONTROL_CASES = (
     "nominal",
     "own_weights",
@@ -61,7 +50,4 @@ CONTROL_CASES = (
     "F_B",
     "two_valves",
 )
-"""What is not as known in ``study-control``."""
-
-MANY = 6
-"""Slips from which on a valve of the field has many."""
+MANY = 6  # slips from which on a valve of the field has many

@@ -7,14 +7,8 @@ import numpy as np
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.loop import (
-    LoopModel,
-    PiController,
-    PiControllers,
-    PiTuning,
-    SetPoints,
-    simulate_closed_loop,
-)
+from stiction_ros.loop import LoopModel, PiController, PiTuning, SetPoints, simulate_closed_loop
+from stiction_studies.blind.pi_controllers import PiControllers
 from stiction_studies.examples.example import Example
 
 SAMPLES = 1500

@@ -16,23 +16,13 @@ from stiction_studies.field.simulation import Loop, Run, Signals, run
 from stiction_studies.field.truth import EVEN, Cause, Swings, Truth, ValveKind, causes, slips
 from stiction_studies.field.valves import Law, slow_triangle
 
-MANY = 6
-"""Slips from which a record shows friction well."""
-
-ATTEMPTS = 6
-"""Loops drawn for a seed, until one is as its circumstances want it."""
-
-MATTERS = 0.1
-"""Share of OP's range that a band has which matters, at least."""
-
-NEGLIGIBLE = 0.05
-"""Share of OP's range that a band has which does not matter, at most."""
-
+MANY = 6  # slips from which a record shows friction well
+ATTEMPTS = 6  # loops drawn for a seed, until one is as its circumstances want it
+MATTERS = 0.1  # share of OP's range that a band has which matters, at least
+NEGLIGIBLE = 0.05  # share of OP's range that a band has which does not matter, at most
+# samples between two slips on average, at least: a record that is slower shows none of them
 APART = 4.0
-"""Samples between two slips on average, at least: a record that is slower shows none of them."""
-
-LIMITED = 0.1
-"""Share of a record in which OP may stand at a limit."""
+LIMITED = 0.1  # share of a record in which OP may stand at a limit
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,15 +9,9 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 
-METHOD = "evidence"
-"""Search when none is given."""
-
-FOUND = ("sticky", "backlash")
-"""Verdicts that find friction."""
-
-REFUSED = "refused"
-"""What stands for a verdict where identification refuses the record."""
-
+METHOD = "evidence"  # search when none is given
+FOUND = ("sticky", "backlash")  # verdicts that find friction
+REFUSED = "refused"  # what stands for a verdict where identification refuses the record
 VERDICTS = ("sticky", "backlash", "healthy", "undecided", REFUSED)
 
 Interval = tuple[float, float]

@@ -23,15 +23,9 @@ from stiction_studies.benches.accuracy.field import FIRST, LAST
 from stiction_studies.field.counterfactual.again import Again, Control, Sampled, TakeOver
 from stiction_studies.seeds import run_seeds
 
-NEAR = 0.25
-"""Share of the truth within which a promise is kept."""
-
-NEAR_NOW = 0.05
-"""The same of what the loop does now."""
-
-PROMISED = 0.10
-"""Share of now that a promise is about."""
-
+NEAR = 0.25  # share of the truth within which a promise is kept
+NEAR_NOW = 0.05  # the same of what the loop does now
+PROMISED = 0.10  # share of now that a promise is about
 KEYS = ("amplitude", "iae_per_hour")
 
 

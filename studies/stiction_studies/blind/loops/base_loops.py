@@ -9,7 +9,8 @@ import numpy as np
 from scipy.signal import cont2discrete
 
 from stiction_ros.effects import FloatArray
-from stiction_ros.loop import LoopModel, PiController, PiControllers, PiTuning
+from stiction_ros.loop import LoopModel, PiController, PiTuning
+from stiction_studies.blind.pi_controllers import PiControllers
 from stiction_studies.blind.pi_stability import largest_gains
 
 MIDDLE = 50.0  # OP and PV of the operating point

@@ -13,14 +13,11 @@ from stiction_studies.field.historian import IndexArray
 from stiction_studies.field.kernels import FloatArray
 from stiction_studies.field.simulation import Loop, Signals, run
 
+# PV, SP and the OP of the sample before, in the units of the record, to the OP from now on
 Control = Callable[[float, float, float], float]
-"""PV, SP and the OP of the sample before, in the units of the record, to the OP from now on."""
-
+# PV and OP of the samples so far, shape (K,), in the units of the record, to the controller
 TakeOver = Callable[[FloatArray, FloatArray], Control]
-"""PV and OP of the samples so far, shape (K,), in the units of the record, to the controller."""
-
-PAST = 1000
-"""Samples that another controller may take over, at most."""
+PAST = 1000  # samples that another controller may take over, at most
 
 
 @dataclasses.dataclass(frozen=True)

@@ -23,17 +23,11 @@ from stiction_studies.field.exports.stamps import StampStyle
 from stiction_studies.field.exports.table import Table, table_of
 from stiction_studies.field.field_loop import FieldLoop
 
+# first letter of the tags of a kind of loop
 LETTERS = {"flow": "F", "pressure": "P", "level": "L", "temperature": "T", "analyser": "A"}
-"""First letter of the tags of a kind of loop."""
-
-SPACING = 1_000_000
-"""Seeds that lie between the loops of two plants, at least."""
-
-BEGIN = 1_731_542_400
-"""The 14th of November 2024, whose day cannot be taken for a month."""
-
-TOGETHER = 20
-"""Loops in one file, at most."""
+SPACING = 1_000_000  # seeds that lie between the loops of two plants, at least
+BEGIN = 1_731_542_400  # the 14th of November 2024, whose day cannot be taken for a month
+TOGETHER = 20  # loops in one file, at most
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,22 +8,15 @@ from stiction_ros.records.record import Quality
 from stiction_studies.field.field_loop import FieldLoop
 from stiction_studies.field.kernels import FloatArray
 
-Cell = float | str | None
-"""A number, a word in its place, or nothing."""
-
-WORDS = ("Bad", "I/O Timeout", "No Data", "#N/A", None)
-"""What stands in the place of a bad value."""
-
+Cell = float | str | None  # a number, a word in its place, or nothing
+WORDS = ("Bad", "I/O Timeout", "No Data", "#N/A", None)  # what stands in the place of a bad value
 SENTINEL = -9999.0
 
+# what a mode shows in automatic and by hand
 MODES = (("AUTO", "MAN"), ("A", "M"), ("CAS", "MAN"), ("Automatic", "Manual"))
-"""What a mode shows in automatic and by hand."""
-
-OFTEN = 0.15
-"""Share of the loops that each thing befalls."""
-
+OFTEN = 0.15  # share of the loops that each thing befalls
+# circumstance of a loop to the unit that its export says
 UNITS = {"op_0_to_1": "0-1", "op_4_to_20": "mA"}
-"""Circumstance of a loop to the unit that its export says."""
 
 
 @dataclasses.dataclass(frozen=True)

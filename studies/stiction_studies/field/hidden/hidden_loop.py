@@ -25,19 +25,11 @@ from stiction_studies.field.plants import log_uniform
 
 FAMILIES = ("single", "two", "physics")
 GIVEN = ("exact", "off")
-HEALTHY = 0.2
-"""Share of loops with one effect that have none."""
-
-ATTEMPTS = 8
-"""Effects drawn, each smaller, until the loop stays in control."""
-
+HEALTHY = 0.2  # share of loops with one effect that have none
+ATTEMPTS = 8  # effects drawn, each smaller, until the loop stays in control
 SMALLER = 0.7
-LIMITED = 0.25
-"""Share of a record in which OP may stand at a limit, unless the stem is limited."""
-
-STEM_RECORDED = 0.08
-"""Share of loops with the stem in the record, where flow is proportional to it."""
-
+LIMITED = 0.25  # share of a record in which OP may stand at a limit, unless the stem is limited
+STEM_RECORDED = 0.08  # share of loops with the stem in the record, where flow is proportional to it
 STEM_STEP = 0.05  # %: to which a recorded stem is rounded
 REACH, KICK = 12.0, 20.0  # %: that a set-point asks at most, and by which it may move OP at once
 PER_UNIT = 30.0  # samples in which 1 % of the valve counts for an integrator

@@ -15,17 +15,13 @@ from stiction_studies.field.hidden.tuning import Tuning
 from stiction_studies.field.kernels import FloatArray
 from stiction_studies.field.valves import Law, Stem, Valve
 
-AT_REST = 50.0
-"""OP and PV about which a loop works."""
-
+AT_REST = 50.0  # OP and PV about which a loop works
 OP_LIMITS = (0.0, 100.0)
-LEAD = 300
-"""Samples before the record begins."""
-
+LEAD = 300  # samples before the record begins
 FAR = 1e9
 
+# of a characteristic, by its law
 CURVES = {"": kernels.EXPONENTIAL, "quadratic": kernels.QUADRATIC, "in a line": kernels.IN_A_LINE}
-"""Of a characteristic, by its law."""
 
 
 @dataclasses.dataclass(frozen=True)
