@@ -130,7 +130,9 @@ def _judged(entry: Entry, record: Record, found: Identification) -> tuple[Entry,
     if not valves or not outputs:
         reason = document["model"].get("reason") or "no model was found"
         raise InputError(reason)
-    chosen = max(range(len(valves)), key=lambda j: _concern(valves[j]))
+    concern = {"sticky": 2, "backlash": 2, "undecided": 1}
+    ranks = [(concern.get(v["verdict"], 0), float(v["band_share"])) for v in valves]
+    chosen = ranks.index(max(ranks))
     valve = valves[chosen]
     output = outputs[min(chosen, len(outputs) - 1)]
     cause = output.get("cause")
@@ -160,11 +162,6 @@ def _judged(entry: Entry, record: Record, found: Identification) -> tuple[Entry,
         beats=_beats(record, outputs.index(output), cycling),
     )
     return entry, chosen
-
-
-def _concern(valve: dict[str, Any]) -> tuple[int, float]:
-    order = {"sticky": 2, "backlash": 2, "undecided": 1}
-    return order.get(valve["verdict"], 0), float(valve["band_share"])
 
 
 def _beats(record: Record, output: int, cycling: Cycling | None) -> tuple[float, ...]:

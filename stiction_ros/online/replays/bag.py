@@ -12,18 +12,8 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.bag.run_metadata import mapping_of
+from stiction_ros.records.run import events
 from stiction_ros.records.run.bag_runs import tell_runs
-from stiction_ros.records.run.events import (
-    DIAGNOSTICS,
-    STRING,
-    Fit,
-    GapLog,
-    ModeChange,
-    fits,
-    gap_log,
-    mode_changes,
-    on_topic,
-)
 from stiction_ros.records.run.loop_signals import JOINT_STATE, LoopSignals
 from stiction_ros.records.storage.bag_metadata import BagTopic
 
@@ -94,10 +84,10 @@ class ReplayBag:
     estimator: NodeConfig | None  # estimator, controller: configurations, None when there is none
     controller: NodeConfig | None
     published_fits: Mapping[int, PublishedFit]  # on ``stiction``, by the end of their window, ns
-    told_fits: Mapping[int, Fit]  # the fits in ``/diagnostics`` by the end of their window, ns
-    told_gaps: GapLog  # what the monitor told in ``/diagnostics``
+    told_fits: Mapping[int, events.Fit]  # those in ``/diagnostics`` by the end of their window, ns
+    told_gaps: events.GapLog  # what the monitor told in ``/diagnostics``
     models: tuple[PublishedModel, ...]  # messages of ``loop_model`` in their order
-    modes: tuple[ModeChange, ...]  # changes of mode in ``/diagnostics``, the first mode included
+    modes: tuple[events.ModeChange, ...]  # changes of mode in ``/diagnostics``, with the first mode
     # a stamp in ns and how many samples the estimator had taken in up to it; None when the bag does
     # not tell
     counted: tuple[int, int] | None
@@ -128,7 +118,7 @@ def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> Replay
     diagnostics = [
         m
         for m in inside
-        if m.type == DIAGNOSTICS
+        if m.type == events.DIAGNOSTICS
         and (not loops or any(str(s.hardware_id) in known for s in m.message.status))
     ]
     notes += _changed_parameters(inside, configs.values())
@@ -144,10 +134,10 @@ def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> Replay
         estimator=configs.get("estimator"),
         controller=configs.get("controller"),
         published_fits=dict(_published_fits(inside)),
-        told_fits={fit.stamp: fit for fit in fits(diagnostics)},
-        told_gaps=gap_log(diagnostics),
+        told_fits={fit.stamp: fit for fit in events.fits(diagnostics)},
+        told_gaps=events.gap_log(diagnostics),
         models=tuple(_models(inside)),
-        modes=mode_changes(diagnostics),
+        modes=events.mode_changes(diagnostics),
         counted=_counted(diagnostics, configs.get("estimator")),
         notes=tuple(notes),
     )
@@ -157,8 +147,8 @@ def _wanted(topic: BagTopic) -> bool:
     name = last_part(topic.name)[1]
     return (
         (topic.type == JOINT_STATE and name in (*_INPUTS, "stiction"))
-        or (topic.type == STRING and name in _TEXTS)
-        or topic.type in (DIAGNOSTICS, PARAMETER_EVENT)
+        or (topic.type == events.STRING and name in _TEXTS)
+        or topic.type in (events.DIAGNOSTICS, PARAMETER_EVENT)
     )
 
 
@@ -181,7 +171,7 @@ def _loop(messages: Iterable[BagMessage], namespace: str | None, where: str) -> 
 def _node_or_topic_space(message: BagMessage) -> str | None:
     """Return the namespace a message belongs to; None for the global topics."""
     space, name = last_part(message.topic)
-    if message.type in (DIAGNOSTICS, PARAMETER_EVENT):
+    if message.type in (events.DIAGNOSTICS, PARAMETER_EVENT):
         return None
     return space.rpartition("/")[0] if name == "config" else space
 
@@ -197,7 +187,7 @@ def _signals(messages: Iterable[BagMessage]) -> Iterator[Signal]:
 
 
 def _published_fits(messages: Iterable[BagMessage]) -> Iterator[tuple[int, PublishedFit]]:
-    for message in on_topic(messages, JOINT_STATE, "stiction"):
+    for message in events.on_topic(messages, JOINT_STATE, "stiction"):
         state = message.message
         if state.header.frame_id == ControlMode.VALVE_TEST:
             continue  # no fit
@@ -215,7 +205,7 @@ def _models(messages: Iterable[BagMessage]) -> Iterator[PublishedModel]:
         name = last_part(message.topic)[1]
         if message.type == JOINT_STATE and name == "op":
             ops.add(stamp_ns(message.message))
-        elif message.type == STRING and name == "loop_model":
+        elif message.type == events.STRING and name == "loop_model":
             text = str(message.message.data)
             document = mapping_of(text)
             valid_from = document.get("valid_from", 0)
@@ -225,7 +215,7 @@ def _models(messages: Iterable[BagMessage]) -> Iterator[PublishedModel]:
 def _configs(messages: Iterable[BagMessage], space: str, notes: list[str]) -> dict[str, NodeConfig]:
     """Return the configurations of estimator and controller, told apart by their parameters."""
     found: dict[str, NodeConfig] = {}
-    for message in on_topic(messages, STRING, "config"):
+    for message in events.on_topic(messages, events.STRING, "config"):
         document = mapping_of(str(message.message.data))
         parameters, model = document.get("parameters"), document.get("model")
         if not isinstance(parameters, dict):

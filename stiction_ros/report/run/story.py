@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from stiction_ros.effects import Behaviour, FrictionPair, SlipJumpPair, Stiction
+from stiction_ros.effects import FrictionPair, SlipJumpPair, Stiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.session import Scenario, run_live
@@ -59,16 +59,11 @@ class Story:
             return None
         for entry in self.truth.valves:
             if entry.name == valve:
-                laws = [e for e in entry.effects if e.effect == Stiction.effect]
-                return _frictions(laws[0]) if laws else (0.0, 0.0)
+                law = next((e for e in entry.effects if e.effect == Stiction.effect), None)
+                if isinstance(law, FrictionPair | SlipJumpPair):
+                    return law.static_friction, law.dynamic_friction
+                return (0.0, 0.0) if law is None else None
         return None
-
-
-def _frictions(law: Behaviour) -> tuple[float, float] | None:
-    """Return f_S and f_D of a law of stiction; None of one that has no such figures."""
-    if isinstance(law, FrictionPair | SlipJumpPair):
-        return law.static_friction, law.dynamic_friction
-    return None
 
 
 def tell(log: RunLog, *, scenario: Scenario | None = None, name: str | None = None) -> Story:
