@@ -61,7 +61,7 @@ def storing(where: object, *, what: str = "written", fix: str = "") -> Iterator[
 
     Args:
         where: the file or folder.
-        what: that cannot be done: ``written``, ``made``.
+        what: that cannot be done: ``written``, ``made``, ``read``.
         fix: how to mend it.
     """
     try:

@@ -77,10 +77,8 @@ class Credentials:
 
 def check_secret_file(path: Path) -> None:
     """Raise InputError unless only the user (or root) owns and reads the file."""
-    try:
+    with storing(path, what="read"):
         found = path.stat()
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", where=str(path)) from None
     if not stat.S_ISREG(found.st_mode):
         raise InputError("is no file", where=str(path))
     if found.st_uid not in (os.getuid(), 0):
@@ -95,10 +93,8 @@ def load_certificate(path: Path) -> "x509.Certificate":
     """Return the certificate in a DER or PEM file."""
     from cryptography import x509
 
-    try:
+    with storing(path, what="read"):
         data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", where=str(path)) from None
     try:
         if data.startswith(b"-----"):
             return x509.load_pem_x509_certificate(data)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.engines.engine import Engine, Task
 from stiction_ros.survey.entry import Entry, Status, SurveyOptions
@@ -80,19 +80,15 @@ def survey(
     if plan.out is None:
         if plan.resume:
             raise InputError("has nothing to go on from", where="--resume", fix="add --out DIR")
-        run = _Run(plan, engine, None, None)
-        return run.done(loops, progress)
-    try:
+        return _Run(plan, engine, None, None).done(loops, progress)
+    with storing(plan.out):
         (plan.out / PAGES).mkdir(parents=True, exist_ok=True)
         with (
             Journal(plan.out, plan.options.mark(), resume=plan.resume) as journal,
             (plan.out / LOG).open("a" if plan.resume else "w", encoding="utf-8") as log,
         ):
-            return _Run(plan, engine, journal, log).done(loops, progress)
-    except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror or error})", where=str(plan.out)
-        ) from None
+            found = _Run(plan, engine, journal, log).done(loops, progress)
+    return found
 
 
 class _Run:

@@ -19,7 +19,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.records.storage.bag_metadata import BagTopic
 from stiction_ros.records.storage.packed import SQLITE, conversion, opened
 
@@ -75,17 +75,12 @@ class McapScan:
         Raises:
             InputError: no such file, not an MCAP file, or damaged inside.
         """
-        try:
-            with opened(self.path) as file:
-                self._refuse_foreign(file.read(len(MAGIC)))
-                if self._salvage:  # the chunk that announces the topics may be damaged
-                    self._learn(_intact_summary(file))
-                file.seek(len(MAGIC))
-                yield from self._data(file)
-        except OSError as error:
-            raise InputError(
-                f"cannot be read ({error.strerror or error})", where=str(self.path)
-            ) from None
+        with storing(self.path, what="read"), opened(self.path) as file:
+            self._refuse_foreign(file.read(len(MAGIC)))
+            if self._salvage:  # the chunk that announces the topics may be damaged
+                self._learn(_intact_summary(file))
+            file.seek(len(MAGIC))
+            yield from self._data(file)
 
     def _refuse_foreign(self, first: bytes) -> None:
         if first and SQLITE.startswith(first):
