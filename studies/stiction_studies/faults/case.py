@@ -179,7 +179,8 @@ class _Watched:
     def _quiet(self) -> bool:
         now = time.monotonic()
         statuses = tuple(self._loop.probe.statuses)
-        return all(level_at(statuses, name, now) == "ok" for name in LOOP)
+        heard = bool(self._loop.known.mode)
+        return heard and all(level_at(statuses, name, now) == "ok" for name in LOOP)
 
     def _ended(self) -> list[str]:
         return [name for name, node in self._loop.nodes.items() if node.code is not None]
