@@ -43,7 +43,7 @@ from stiction_ros.discrepancy.gap.measure import (
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.measures import SURE
-from stiction_ros.discrepancy.process.refit import open_figures
+from stiction_ros.discrepancy.process.change import open_figures
 from stiction_ros.discrepancy.steps.look import MOVED_AWAY, explained
 from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task

@@ -21,7 +21,6 @@ from stiction_ros.discrepancy.decision.explanation import (
     Explanation,
     left_open,
     refit_together,
-    run_with,
 )
 from stiction_ros.discrepancy.decision.extend import (
     extend,
@@ -39,7 +38,7 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.measures import TURNS
-from stiction_ros.discrepancy.process.refit import open_figures, refitted_behind
+from stiction_ros.discrepancy.process.change import open_figures, refitted_process
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import changed_again, process_first
@@ -198,7 +197,7 @@ def _extended(task: Task, state: State, decision: Decision) -> tuple[Explanation
     else:
         effects = process.effects
     for _ in range(TURNS if fitted else 0):
-        bare = refitted_behind(process.bare, run_with(process.bare, task.runs, effects))
+        bare = refitted_process(process.bare, task.runs, effects)
         process = dataclasses.replace(process, bare=bare)
         effects = refit_together(bare, task.runs, effects)
     return extend(process, effects, now.base, lent=lent)
