@@ -22,11 +22,7 @@ from stiction_ros.discrepancy.gap.noise_effects import NoiseEffect, named_laws
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.effects import Backlash, Behaviour, FloatArray, HeStiction
 
-WIDEST = 10.0  # times the range of its signal that an interval of a size may be wide
-WHOLE = 0.95  # of a range of search: an interval that wide holds nothing out
 NO_MEMORY = np.zeros(0)
-SIZES = ("size", "rate", "amplitude")
-FACTOR = "factor"  # of a gain, 1 where it is the model's
 
 
 @dataclasses.dataclass(frozen=True)
@@ -152,38 +148,6 @@ def moved_by(without: Baseline, base: Baseline) -> FloatArray:
     """Return what an effect adds to the free run that is shown, shape (N, p)."""
     pairs = zip(levelled(without).noise, levelled(base).noise, strict=True)
     return np.column_stack([old.residual - new.residual for old, new in pairs])
-
-
-def holds_nothing_out(
-    effect: AddedEffect, base: Baseline, intervals: Mapping[str, tuple[float, float]]
-) -> bool:
-    """Tell whether an interval allows any size, or next to the whole range of the search."""
-    run, candidate = base.run, effect.fit.candidate
-    kind, _, tag = effect.place.partition(":")
-    if kind in ("valve", "load"):
-        signal = run.runs.op[:, run.model.valve_names.index(tag)]
-    else:
-        signal = run.runs.pv[:, run.model.outputs.index(tag)]
-    span = float(np.ptp(signal))
-    lasts = float(run.runs.time.max())
-    for key, (low, high) in intervals.items():
-        if key == FACTOR and low <= 1.0 <= high:
-            return True
-        if key in SIZES and candidate.factors:  # of a wave or a walk; a slew has a rate of its own
-            reach = span / lasts if key == "rate" else span
-            if low <= 0.0 <= high:
-                return True
-            if kind != "load" and high - low > WIDEST * reach and reach > 0.0:
-                return True
-    figures = [p.key for p in effect.behaviour.parameters()]
-    for key, axis in zip(figures, candidate.axes, strict=False):
-        if key not in intervals or axis.linear or axis.natural or candidate.factors:
-            continue
-        low, high = (axis.inner(min(max(end, axis.low), axis.high)) for end in intervals[key])
-        whole = axis.inner(axis.high) - axis.inner(axis.low)
-        if whole > 0.0 and high - low > WHOLE * whole:
-            return True
-    return False
 
 
 def without_its_jump(intervals: Intervals, effect: AddedEffect) -> Intervals:

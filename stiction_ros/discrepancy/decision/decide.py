@@ -58,11 +58,6 @@ class Decision:
     # not yet in the model may be why. None where there is none
     lent: CandidateFit | None = None
 
-    @property
-    def tried(self) -> CandidateFit | None:
-        """The candidate that is added to the model, for good or for a while."""
-        return self.chosen or self.lent
-
 
 def decide(
     fits: Sequence[CandidateFit], margin: float, departures: Callable[[CandidateFit], int]
@@ -129,21 +124,6 @@ def decide(
     return Decision(GapVerdict.NAMED, best, (), True, "it beats no effect and its rivals")
 
 
-def thinned_away(decision: Decision, measured: float) -> Decision:
-    """Return what may be said where too few values were measured for an answer.
-
-    Args:
-        decision: what could be said if all had been.
-        measured: share of the values that were.
-    """
-    if decision.verdict is GapVerdict.NONE:
-        return decision
-    best = decision.chosen
-    told = decision.reason if best is None else _would_explain(best)
-    left = f"{100.0 * measured:.0f} % of the values were measured, too few for a name"
-    return Decision(GapVerdict.UNKNOWN, None, (), False, f"{told}; {left}")
-
-
 def confirmed(fit: CandidateFit) -> bool:
     """Tell whether the held-out rows bear an effect out, chance allowed for."""
     return borne_out(fit.delta_bic, fit.held_gain, fit.candidate.dated)
@@ -178,13 +158,8 @@ def on_the_way(place: str, effect: str) -> bool:
 
 
 def _unknown(stranger: CandidateFit, reason: str, lent: CandidateFit | None) -> Decision:
-    return Decision(
-        GapVerdict.UNKNOWN, None, (), False, f"{_would_explain(stranger)}; {reason}", lent
-    )
-
-
-def _would_explain(fit: CandidateFit) -> str:
-    return f"{fit.candidate.name} would explain the gap by {fit.evidence:.0f}"
+    said = f"{stranger.candidate.name} would explain the gap by {stranger.evidence:.0f}; {reason}"
+    return Decision(GapVerdict.UNKNOWN, None, (), False, said, lent)
 
 
 def _part(fit: CandidateFit, stranger: CandidateFit) -> bool:

@@ -5,12 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.decision.decide import FRICTION, borne_out, stem_misfit
+from stiction_ros.discrepancy.decision.decide import FRICTION, borne_out
 from stiction_ros.discrepancy.decision.explanation import AddedEffect, Explanation, refit_together
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.measures import MARGIN
-from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray
 from stiction_ros.signals.holds import stretches
 
@@ -36,8 +35,7 @@ def extend(
     grown = process.holding([*worth, new])
     if not (lent or held_rows_bear_out(before, grown.base, dated=new.fit.candidate.dated)):
         return None, "the innovations of the held-out rows do not become smaller"
-    trouble = _stem_trouble(before, grown.base, new.place)
-    return (None, trouble) if trouble else (grown, "")
+    return grown, ""
 
 
 def told_already(added: Sequence[AddedEffect], fit: CandidateFit) -> bool:
@@ -81,27 +79,3 @@ def moved_away(base: Baseline, after_base: Baseline) -> bool:
     if blocks_of_one < 3:
         return float(total.sum()) > 0.0
     return float(total.mean()) > GROWN * float(total.std(ddof=1)) / math.sqrt(blocks_of_one)
-
-
-def _stem_trouble(base: Baseline, after_base: Baseline, place: str) -> str:
-    """Return where the measured stems contradict the effect; empty where they do not.
-
-    A stem speaks of what moves it: an effect elsewhere leaves it, but for the figures of others
-    that are fitted again.
-    """
-    for j, valve in enumerate(base.run.model.valve_names):
-        if place != f"valve:{valve}":
-            continue
-        old = stem_misfit(base.run, j, base.run.stems[:, j])
-        if stem_misfit(base.run, j, _from_measured(after_base.run, j)) > old:
-            return f"the measured stem of {valve} is further from that effect than without it"
-    return ""
-
-
-def _from_measured(run: FreeRun, valve: int) -> FloatArray:
-    """Return the stem of a valve, shape (N,), from where the first record shows it."""
-    record, name = run.runs.records[0], run.model.valve_names[valve]
-    if record.stem is None:
-        return run.stems[:, valve]
-    lead = float(record.stem[0, record.valves.index(name)] - run.runs.op[0, valve])
-    return FreeRun(run.model, run.runs, {**run.leads, name: lead}).stems[:, valve]

@@ -16,8 +16,12 @@ from stiction_ros.discrepancy.decision.explanation import (
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.least_squares import left_by
 from stiction_ros.discrepancy.measures import GAUSS_NEWTON, MARGIN, NORMAL, ROUNDING
-from stiction_ros.discrepancy.process.free_equation import Equation
-from stiction_ros.discrepancy.process.refit import equations_of, process_with, with_equations
+from stiction_ros.discrepancy.process.equations import (
+    Equation,
+    equations_of,
+    process_with,
+    with_equations,
+)
 from stiction_ros.discrepancy.process.slower import GAIN, Changeable
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
@@ -71,6 +75,26 @@ def changed_process(
     return Explanation.of(model, runs, fitted, tuple(changes), tuple(slopes))
 
 
+def refitted_process(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect] = ()) -> LoopModel:
+    """Return the model with all figures of its process at their best: it was fitted to records.
+
+    Args:
+        bare: the model without effects, with an ARX process.
+        runs: the records.
+        effects: behind which its process is fitted again, with their figures.
+    """
+    model = bare
+    for output in range(len(bare.outputs)):
+        model = _Search(model, runs, tuple(effects), output, declared=False).refitted()
+    return model
+
+
+def open_figures(run: FreeRun) -> list[FloatArray]:
+    """Return per output what a unit of each figure of its process moves, shape (N, figures)."""
+    searches = [_Search(run.model, run.runs, (), i, False) for i in range(len(run.model.outputs))]
+    return [search.moved_by(run, run.gap[:, search.output]) for search in searches]
+
+
 def _stepped(effect: AddedEffect, more: float) -> AddedEffect:
     """Return an effect with ``more`` of its first figure, in coordinates of its search."""
     candidate, point = effect.fit.candidate, effect.fit.point.copy()
@@ -100,6 +124,14 @@ class _Search:
         self.most = np.array([each.most for each in self.figures])
         self.gains = np.array([each.what == GAIN for each in self.figures])
         self.probes = np.array([each.probe for each in self.figures])
+        self.free = np.ones(len(self.figures), dtype=bool)
+        self.values, self.errors = np.zeros(len(self.free)), np.full(len(self.free), np.inf)
+
+    def refitted(self) -> LoopModel:
+        """Return the model with all figures stepped; as it was where that explains no more."""
+        before = self._state()[0]
+        self._settle()
+        return self.changed(self.values) if self._state()[0] < before else self.model
 
     def run(self) -> bool:
         """Step all figures, then each alone, as they may trade off; several gain the margin."""
@@ -187,9 +219,15 @@ class _Search:
     def slopes(self) -> FloatArray:
         """Return what a unit of every free figure moves, shape (N, figures)."""
         run = self._run(self.values)
-        return self._of_figures(run, run.gap[:, self.output])
+        return self.moved_by(run, run.gap[:, self.output])
 
-    def _of_figures(self, run: FreeRun, gap: FloatArray) -> FloatArray:
+    def moved_by(self, run: FreeRun, gap: FloatArray) -> FloatArray:
+        """Return what a unit of every free figure moves of a run, shape (N, figures).
+
+        Args:
+            run: of the model with the figures as they are.
+            gap: that it leaves of this output, shape (N,).
+        """
         moved = []
         for k, each in enumerate(np.eye(len(self.free))):
             if self.free[k]:
@@ -200,7 +238,7 @@ class _Search:
 
     def _slopes(self, run: FreeRun, gap: FloatArray) -> FloatArray:
         """Return what a unit of every free figure and smooth effect moves, shape (N, figures)."""
-        moved = [self._of_figures(run, gap)]
+        moved = [self.moved_by(run, gap)]
         model = run.model if not self.smooth else self.changed(self.values)
         for k in self.smooth:
             other = run_with(model, self.runs, self._with_stepped(k, PROBE))

@@ -5,15 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.data.gate import open_gate
-from stiction_ros.discrepancy.process.refit import process_refitted
 from stiction_ros.errors import InputError
 from stiction_ros.identification.answer.identified_loop import identified_loop
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.linear.data import LinearKind
-from stiction_ros.identification.linear.fit import LinearOptions, fit_linear
 from stiction_ros.identification.methods import identify
-from stiction_ros.identification.result import VerdictKind
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 
@@ -47,12 +42,7 @@ def _cut(record: Record, count: int) -> Record:
 
 
 def first_model(records: Sequence[Record], delay: tuple[int, int] = (0, 10)) -> LoopModel:
-    """Return ARX equations fitted to the longest record, with ideal valves.
-
-    Where identification finds friction, the process is the one that it found behind the friction.
-    Otherwise it is a linear fit from OP to PV, fitted again to the free run. Without set-point
-    moves of many coefficients such a fit could make the controller turned upside down, so it has
-    two a and two b.
+    """Return the process that identification finds in the longest record, with ideal valves.
 
     Args:
         records: one at least.
@@ -66,14 +56,7 @@ def first_model(records: Sequence[Record], delay: tuple[int, int] = (0, 10)) -> 
     longest = max(liveliest_parts(records), key=len)
     name = longest.name.removesuffix(".csv") or "loop"
     found = identify(longest, IdentificationOptions(delay=delay))
-    if any(v.verdict in (VerdictKind.STICKY, VerdictKind.BACKLASH) for v in found.valves):
-        return _process_alone(identified_loop(longest, found, name))
-    options = LinearOptions(kind=LinearKind.ARX, delay=delay)
-    if not _moved(longest):
-        options = LinearOptions(LinearKind.ARX, output_order=2, input_order=2, delay=delay)
-    model = _process_alone(fit_linear(longest, options).loop_model(name))
-    runs, _ = open_gate(model, [longest])
-    return process_refitted(model, runs)
+    return _process_alone(identified_loop(longest, found, name))
 
 
 def _process_alone(model: LoopModel) -> LoopModel:
@@ -83,7 +66,3 @@ def _process_alone(model: LoopModel) -> LoopModel:
     for entry in document["process"]["outputs"]:
         entry.pop("noise", None)
     return LoopModel.from_mapping(document, model.name)
-
-
-def _moved(record: Record) -> bool:
-    return record.sp is not None and bool(np.any(np.ptp(record.sp, axis=0) > 0.0))

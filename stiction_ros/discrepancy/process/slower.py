@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from stiction_ros.discrepancy.measures import ROUNDING
-from stiction_ros.discrepancy.process.free_equation import Equation
+from stiction_ros.discrepancy.process.equations import Equation
 from stiction_ros.effects import FloatArray
 
 FRACTIONS = 41  # of a sample, at which the dead time's is looked for

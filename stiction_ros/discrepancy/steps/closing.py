@@ -7,7 +7,6 @@ import numpy as np
 
 from stiction_ros.discrepancy.answer.found_effects import (
     FoundEffect,
-    holds_nothing_out,
     moved_by,
     of_data,
     of_noise,
@@ -25,7 +24,6 @@ from stiction_ros.discrepancy.answer.say import (
 )
 from stiction_ros.discrepancy.decision.decide import GapVerdict, on_the_way, verdict_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.fit.uncertainty import (
     Intervals,
     bootstrap_intervals,
@@ -42,17 +40,13 @@ from stiction_ros.discrepancy.gap.measure import (
 )
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.measures import SURE
-from stiction_ros.discrepancy.process.refit import open_figures
-from stiction_ros.discrepancy.steps.look import MOVED_AWAY, explained
+from stiction_ros.discrepancy.process.change import open_figures
+from stiction_ros.discrepancy.steps.look import explained
 from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import with_laws
 from stiction_ros.effects import FloatArray
-from stiction_ros.signals.autoregression import gain_of_noise
 
 A_ROW = 0.1  # of −2 log likelihood, that noise gains beside an effect: a twentieth of its σ
-DROWNED = 4.0  # times the declared noise: more is none that thinned values add to it
 MATTERS = 0.2  # of the gap, that an effect has to close by itself, and a noise that is left to be
 
 
@@ -64,7 +58,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
         looked = settle(task, state.doubted)
         state, found = _named(task, looked)
     before, after = free_run_gap(state.before), free_run_gap(state.now.base)
-    louder = [] if _explained_by_no_name(task, looked, state) else _louder(task, state)
+    louder = _louder(task, state)
     shown, answers = [of_data(finding) for finding in task.data], [*found, *louder]
     effects = [*shown, *answers]
     verdict, alternatives = overall(shown, answers, state.looks, state.testable)
@@ -84,9 +78,9 @@ def closing(task: Task, looked: State) -> Discrepancy:
         if max(fit.evidence for fit in state.looks[-1].scores.fits) < LEFT * gained:
             verdict = effects[0].verdict if effects else GapVerdict.NONE
     silent = not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE)
-    if silent and (no_names or _taken_back(task, state) or _noise_left(state, noises)):
+    if silent and no_names:
         verdict = GapVerdict.UNKNOWN
-    if state.now.changes and silent and verdict is not GapVerdict.UNKNOWN:
+    elif silent and state.now.changes:
         verdict = GapVerdict.NAMED
     told = {(e.place, e.effect) for e in effects} | {n for e in effects for n in e.alternatives}
     told |= set(alternatives)
@@ -140,10 +134,7 @@ def _where(
     last = state.looks[-1].decision
     if last.verdict is GapVerdict.UNKNOWN:
         found.append(last.reason)
-    found += [f"{each} would fit, but its figures hold nothing out" for each in no_names]
-    if verdict is GapVerdict.UNKNOWN:
-        taken = [called(*fit.candidate.key) for fit in _taken_back(task, state)]
-        found += [f"{each} would fit, but {MOVED_AWAY} with it" for each in taken]
+    found += [f"{each} would fit, but closes next to nothing of the gap" for each in no_names]
     return tuple(found)
 
 
@@ -151,11 +142,7 @@ def _named(task: Task, state: State) -> tuple[State, list[FoundEffect]]:
     """Return what is left when effects that are no names are gone, and the names."""
     while True:
         found = _found(task, state)
-        no_name = [
-            k
-            for k, (shown, effect) in enumerate(zip(found, state.now.effects, strict=True))
-            if holds_nothing_out(effect, state.now.base, shown.intervals) or shown.closed < MATTERS
-        ]
+        no_name = [k for k, shown in enumerate(found) if shown.closed < MATTERS]
         if not no_name:
             return state, found
         state = state.holding(state.now.others(no_name[-1]))
@@ -219,14 +206,6 @@ def _intervals(
     return without_its_jump(found, effect)
 
 
-def _explained_by_no_name(task: Task, looked: State, state: State) -> bool:
-    """Tell whether effects that are no names explain as much as a noise does in their stead."""
-    if len(looked.now.effects) == len(state.now.effects):
-        return False
-    margin = task.options.margin
-    return looked.now.worth(margin) < with_laws(state.now).worth(margin) + margin
-
-
 def _louder(task: Task, state: State) -> list[FoundEffect]:
     """Return the noise beyond the declared one as effects.
 
@@ -261,31 +240,6 @@ def _stranger(state: State, law: NoiseEffect) -> float:
     if last.decision.chosen is not None and not last.kept:
         return last.decision.chosen.evidence
     return -NO_LAW
-
-
-def _noise_left(state: State, noises: tuple[OutputNoise, ...]) -> bool:
-    """Tell whether noise is left that no law tells, and that is large enough to matter."""
-    return any(
-        (each.memory and (not state.now.changes or _matters(state, i))) or _drowned(state, i)
-        for i, each in enumerate(noises)
-    )
-
-
-def _taken_back(task: Task, state: State) -> list[CandidateFit]:
-    """Return what surely gains and was taken back: there is a gap, whatever it is."""
-    tried = [look.decision.tried for look in state.looks if look.reason == MOVED_AWAY]
-    return [fit for fit in tried if fit and fit.evidence >= task.options.margin + SURE]
-
-
-def _drowned(state: State, output: int) -> bool:
-    """Tell whether values that were thinned out leave far more than the declared noise."""
-    run = state.now.base.run
-    declared = declared_noise(run.model)[output]
-    if declared is None or not run.runs.thinned[output]:
-        return False
-    rows = state.now.base.blocks[output].train
-    left = float(np.std(state.now.base.noise[output].residual[rows]))
-    return left > DROWNED * declared.std * math.sqrt(gain_of_noise(declared.ar))
 
 
 def _matters(state: State, output: int) -> bool:

@@ -1,7 +1,7 @@
 """One look: every candidate scored, one effect added if the scores allow a name for it."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from stiction_ros.discrepancy.decision.decide import (
     confirmed_by_stem,
     decide,
     not_contradicted,
-    thinned_away,
     told_by_stem,
 )
 from stiction_ros.discrepancy.decision.explanation import (
@@ -21,7 +20,6 @@ from stiction_ros.discrepancy.decision.explanation import (
     Explanation,
     left_open,
     refit_together,
-    run_with,
 )
 from stiction_ros.discrepancy.decision.extend import (
     extend,
@@ -38,15 +36,12 @@ from stiction_ros.discrepancy.decision.scores import (
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.gap.where import locate
-from stiction_ros.discrepancy.measures import TURNS
-from stiction_ros.discrepancy.process.refit import open_figures, refitted_behind
-from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.discrepancy.measures import ROUNDING, TURNS
+from stiction_ros.discrepancy.process.change import open_figures, refitted_process
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import changed_again, process_first
 
 SCORED = 0.8  # of the time of a look
-MANY = 0.2  # of the values, that were held or interpolated
-MOST_THINNED = 0.95  # of the values
 MOVED_AWAY = "the free run of the held-out rows moves away from PV"
 """Why an effect is taken back that the looks had kept."""
 
@@ -157,29 +152,20 @@ def decided(task: Task, state: State, scores: Scores) -> Decision:
     """Return what the scores allow to say.
 
     Values between those that were kept are none that were measured: all evidence counts by the
-    share of the others. What would be an answer if all had been measured is not nothing.
+    share of the others.
     """
     base = scores.base
-    measured = 1.0 - min(max(task.runs.thinned), MOST_THINNED)
+    measured = max(1.0 - max(task.runs.thinned), ROUNDING)
     possible = not_contradicted(base.run, scores.fits)
     allowed = [fit for fit in possible if not told_already(state.now.effects, fit)]
-    margin, rests = task.options.margin, rests_left(base.run)
-    decision = decide(allowed, margin / measured, rests)
-    if measured < 1.0 and decision.verdict is GapVerdict.NONE:
-        decision = thinned_away(decide(allowed, margin, rests), measured)
+
+    def rests(fit: CandidateFit) -> int:
+        return departures(base.run, fit.candidate, fit.point)
+
+    decision = decide(allowed, task.options.margin / measured, rests)
     if task.options.process_fitted:
         decision = _in_doubt_of_place(base, decision)
     return told_by_stem(base.run, decision, allowed)
-
-
-def rests_left(run: FreeRun) -> Callable[[CandidateFit], int]:
-    """Return what counts how often the stem of a fit leaves a rest, as far as PV shows it.
-
-    Where many values were thinned out, PV does not show how a stem leaves its rest.
-    """
-    if max(run.runs.thinned) > MANY:
-        return lambda fit: 0
-    return lambda fit: departures(run, fit.candidate, fit.point)
 
 
 def _extended(task: Task, state: State, decision: Decision) -> tuple[Explanation | None, str]:
@@ -198,7 +184,7 @@ def _extended(task: Task, state: State, decision: Decision) -> tuple[Explanation
     else:
         effects = process.effects
     for _ in range(TURNS if fitted else 0):
-        bare = refitted_behind(process.bare, run_with(process.bare, task.runs, effects))
+        bare = refitted_process(process.bare, task.runs, effects)
         process = dataclasses.replace(process, bare=bare)
         effects = refit_together(bare, task.runs, effects)
     return extend(process, effects, now.base, lent=lent)

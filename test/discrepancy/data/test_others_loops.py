@@ -322,11 +322,6 @@ def test_two_spikes_in_a_row_are_no_steps() -> None:
     assert names(answer) == [("valve:V1", "backlash"), ("disturbance:PV1", "sine")]
 
 
-def test_a_walk_behind_thinned_values_is_not_nothing() -> None:
-    assert answered(102).verdict is GapVerdict.UNKNOWN
-    assert answered(822).verdict is GapVerdict.NONE  # healthy
-
-
 @pytest.mark.trial
 def test_values_between_kept_ones_are_no_evidence() -> None:
     kept = answered(315)  # a gain, three values of four between kept ones

@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-import pytest
 
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.decision.decide import (
@@ -11,7 +10,6 @@ from stiction_ros.discrepancy.decision.decide import (
     GapVerdict,
     borne_out,
     decide,
-    thinned_away,
     verdict_of,
 )
 from stiction_ros.discrepancy.fit.search import CandidateFit
@@ -117,14 +115,14 @@ def test_a_better_rival_outside_the_catalogue_is_unknown() -> None:
 def test_what_gains_most_and_held_out_rows_refuse_is_lent() -> None:
     refused = fit("process:PV1", "gain", 120.0, held=-5.0)
     answer = said(refused)
-    assert (answer.verdict, answer.chosen, answer.tried) == (GapVerdict.UNKNOWN, None, refused)
+    assert (answer.verdict, answer.chosen, answer.lent) == (GapVerdict.UNKNOWN, None, refused)
 
 
 def test_what_is_refused_is_lent_before_less_is_named() -> None:
     refused = fit("valve:V1", "characteristic", 400.0, held=-60.0)
     less = fit("process:PV1", "gain", 200.0)
     answer = said(refused, less)
-    assert (answer.verdict, answer.tried) == (GapVerdict.UNKNOWN, refused)
+    assert (answer.verdict, answer.lent) == (GapVerdict.UNKNOWN, refused)
     near = dataclasses.replace(less, delta_bic=330.0)
     assert said(refused, near).chosen is near
 
@@ -133,9 +131,9 @@ def test_what_a_rival_outside_the_catalogue_beats_is_not_lent() -> None:
     refused = fit("process:PV1", "gain", 120.0, held=-5.0)
     stranger = fit("process:PV1", "gain that changes", 140.0, inside=False)
     step = fit("load:V1", "step", 30.0)
-    assert said(refused, stranger, step).tried is None
+    assert said(refused, stranger, step).lent is None
     less = dataclasses.replace(stranger, delta_bic=100.0)
-    assert said(refused, less, step).tried is refused
+    assert said(refused, less, step).lent is refused
 
 
 def test_a_lag_is_named_wherever_it_is() -> None:
@@ -206,21 +204,3 @@ def test_a_step_is_looked_at_before_a_change_that_contains_it() -> None:
 def test_what_comes_at_one_moment_need_not_show_on_held_out_rows() -> None:
     assert not borne_out(700.0, -5.0, dated=False)
     assert borne_out(700.0, -5.0, dated=True)
-
-
-@pytest.mark.parametrize("rival", [20.0, 32.0])
-def test_what_too_few_values_were_measured_for_is_unknown_and_never_lent(rival: float) -> None:
-    answer = thinned_away(said(fit("process:PV1", "gain", 30.0), fit("v", "slew", rival)), 0.14)
-    assert answer.verdict is GapVerdict.UNKNOWN
-    assert answer.tried is None
-    assert "14 % of the values were measured" in answer.reason
-
-
-def test_a_refused_effect_of_thinned_values_is_not_lent() -> None:
-    refused = said(fit("process:PV1", "gain", 90.0, held=-40.0))
-    assert refused.lent is not None
-    assert thinned_away(refused, 0.14).tried is None
-
-
-def test_nothing_in_thinned_values_is_nothing() -> None:
-    assert thinned_away(said(fit("process:PV1", "gain", 2.0)), 0.14).verdict is GapVerdict.NONE

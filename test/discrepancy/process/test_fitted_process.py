@@ -8,14 +8,6 @@ from gap_loops import loop, record, without_set_points
 
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
 from stiction_ros.discrepancy.process.first_model import first_model, liveliest_parts
-from stiction_ros.discrepancy.process.refit import (
-    equations_of,
-    longest_delay,
-    problems_of,
-    refit_output,
-    with_common_rows,
-)
-from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
 from stiction_ros.effects import Behaviour, Characteristic, HeStiction
 from stiction_ros.loop import LoopModel, Plant
 from stiction_ros.online.controller.live import LiveController
@@ -106,16 +98,6 @@ def test_several_records_are_fitted_together() -> None:
     assert [e.effect for e in answer.effects] == ["stiction"]
     assert answer.effects[0].parameters["f_s"] == pytest.approx(4.0, abs=0.3)
     assert answer.closed > 0.5
-
-
-def test_more_coefficients_never_fit_worse() -> None:
-    data = recorded(HeStiction(4.0, 1.5))
-    model = first_model([data])
-    runs = with_common_rows(join_records(model, [data]), model)
-    (problem,), (own,) = problems_of(FreeRun(model, runs)), equations_of(model)
-    fewer = dataclasses.replace(own, b=(own.b[0][:1],))
-    longest = longest_delay(model)
-    assert refit_output(problem, own, longest).bic <= refit_output(problem, fewer, longest).bic
 
 
 def test_a_long_record_keeps_its_liveliest_part() -> None:
