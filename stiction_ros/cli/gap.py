@@ -128,6 +128,7 @@ def _write(found: "Discrepancy", directory: Path) -> None:
 
 def _print(found: "Discrepancy", command: str) -> None:
     """Print the answer; to the ``command`` that was given a further record may be added."""
+    from stiction_ros.discrepancy import GapVerdict
     from stiction_ros.report.gap_words import called, plain
 
     console = Console()
@@ -172,7 +173,7 @@ def _print(found: "Discrepancy", command: str) -> None:
     if found.untestable:
         listed = ", ".join(called(t.place, t.effect) for t in found.untestable)
         console.print(f"not testable here: {listed}", markup=False)
-    if found.not_considered:
+    if found.verdict is not GapVerdict.NAMED:  # a page lists them, whatever the verdict
         reasons: dict[str, set[str]] = {}
         for entry in found.not_considered:
             reasons.setdefault(entry.reason, set()).add(entry.name)

@@ -9,10 +9,11 @@ from stiction_ros.discrepancy.answer.found_effects import FoundEffect
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.candidate.output import LONGEST_DELAY
-from stiction_ros.discrepancy.candidate.valve import ValveCandidate, valve_candidates
+from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.decision.scores import Testable
+from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.measures import MAJORITY
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Behaviour, FloatArray, about
@@ -171,17 +172,17 @@ class StemLook:
             return f"{head}; no single effect of a valve explains that"
         figures = ", ".join(f"{k} {v:.3g}" for k, v in figures_of(self.behaviour).items())
         share = f"{100.0 * self.share:.0f} %"
-        return f"{head}; {self.behaviour.title()} ({figures}) explains {share} of that by the stem"
+        return f"{head}; {self.behaviour.title()} ({figures}) explains {share} of that"
 
 
-def look_at_stems(run: FreeRun) -> tuple[StemLook, ...]:
-    """Return what every stem says that is recorded throughout."""
+def look_at_stems(run: FreeRun, fits: Sequence[CandidateFit]) -> tuple[StemLook, ...]:
+    """Return what every stem says that is recorded throughout, effects as they fit PV."""
     if any(record.stem is None for record in run.runs.records):
         return ()
-    return tuple(_look(run, j) for j in range(len(run.model.valves)))
+    return tuple(_look(run, j, fits) for j in range(len(run.model.valves)))
 
 
-def _look(run: FreeRun, valve: int) -> StemLook:
+def _look(run: FreeRun, valve: int, fits: Sequence[CandidateFit]) -> StemLook:
     name = run.model.valve_names[valve]
     parts = []
     for record in run.runs.records:
@@ -192,13 +193,14 @@ def _look(run: FreeRun, valve: int) -> StemLook:
     constant = float(np.median(stem - op))
     before = _left(stem, op[:, None])[0]
     best, share = None, MAJORITY
-    for candidate in valve_candidates(run):
+    for fit in fits:
+        candidate = fit.candidate
         if not isinstance(candidate, ValveCandidate) or candidate.valve != valve:
             continue
-        point, left = _nearest(candidate, run, stem)
-        gone = 1.0 - left / max(float(before), 1e-300)
+        tried = candidate.stems(run, fit.point[None, :], from_measured=True)
+        gone = 1.0 - float(_left(stem, tried)[0]) / max(float(before), 1e-300)
         if gone > share:
-            best, share = candidate.behaviour(point, np.zeros(0)), gone
+            best, share = fit.behaviour, gone
     lates = range(LONGEST_DELAY + 1)
     shifted = [_left(stem[late:], op[: len(op) - late, None])[0] for late in lates]
     late = int(np.argmin(shifted))
@@ -212,20 +214,6 @@ def _look(run: FreeRun, valve: int) -> StemLook:
         share if best is not None else 0.0,
         float(np.ptp(op)),
     )
-
-
-def _nearest(candidate: ValveCandidate, run: FreeRun, stem: FloatArray) -> tuple[FloatArray, float]:
-    """Return the figures whose stem is nearest, shape (axes,), and its squared distance."""
-    from scipy.optimize import differential_evolution
-
-    def left(coordinates: FloatArray) -> FloatArray:
-        return _left(stem, candidate.stems(run, candidate.values(coordinates.T)))
-
-    ranges = [(axis.inner(axis.low), axis.inner(axis.high)) for axis in candidate.axes]
-    found = differential_evolution(
-        left, ranges, seed=0, vectorized=True, updating="deferred", polish=False
-    )
-    return candidate.values(found.x[None, :])[0], float(found.fun)
 
 
 def _left(stem: FloatArray, tried: FloatArray) -> FloatArray:

@@ -121,12 +121,14 @@ def _where(
 ) -> tuple[str, ...]:
     """Return the sentences that say where the gap is, the stem's first.
 
-    Where nothing is missed there is no such place; the noise may still be another than declared.
+    Where nothing is missed there is no such place; where the first look found an effect, that says
+    where. The noise may still be another than declared.
     """
     found: list[str] = []
     if verdict is not GapVerdict.NONE:
-        found += [stem.sentence for stem in look_at_stems(state.before.run)]
-        found += [sentence for look in state.looks[:1] for sentence in look.where.sentences]
+        first = state.looks[0]
+        found += [each.sentence for each in look_at_stems(state.before.run, first.scores.fits)]
+        found += () if first.kept else first.where.sentences
     found += noise_sentences(check_noise(state.before), task.runs.sample_time)
     if state.now.effects:
         left = noise_sentences(noises, task.runs.sample_time)
