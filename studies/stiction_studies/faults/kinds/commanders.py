@@ -46,7 +46,7 @@ TWO = (Notice("plant", "error"), Notice("controller", "error"))
 FAULTS = (
     Fault(
         "op-stranger",
-        "an OP under another name is refused; who it was is said",
+        "an OP under another name is refused; the sender is named",
         stranger(STRANGER),
         notices=REFUSED,
     ),
@@ -79,7 +79,7 @@ FAULTS = (
     ),
     Fault(
         "second-controller",
-        "a controller of another name is not obeyed, and said to be there",
+        "a controller of another name is not obeyed, and reported",
         second_controller("controller2"),
         (Pace.REALTIME,),
         notices=REFUSED,
@@ -87,7 +87,7 @@ FAULTS = (
     ),
     Fault(
         "second-controller-same-name",
-        "two controllers of one name: both nodes that notice say so, and the first OP of a "
+        "two controllers of one name: both nodes that notice report it, and the first OP of a "
         "sample wins",
         second_controller("controller"),
         (Pace.REALTIME,),

@@ -49,8 +49,8 @@ FAULTS = (
     ),
     Fault(
         "pv-gone",
-        "without PV the plan is followed, then OP held; controller and estimator say so; the "
-        "return is without a jump",
+        "without PV the controller follows its plan, then holds OP; controller and estimator "
+        "report it; OP does not jump when PV returns",
         relayed("pv", lambda: drop_all, seconds=LONG),
         relayed=("pv",),
         notices=NO_PV,
@@ -80,7 +80,7 @@ FAULTS = (
     ),
     Fault(
         "pv-bad",
-        "PVs that are NaN are bad quality: the plan is followed",
+        "a PV that is NaN has bad quality: the controller follows its plan",
         relayed("pv", lambda: instead(lambda row: [NAN] * len(row), 8), seconds=1.0),
         relayed=("pv",),
         notices=BAD,
@@ -94,22 +94,21 @@ FAULTS = (
     ),
     Fault(
         "sp-lost",
-        "without set-points the last one holds in realtime; in lockstep the plant shows them again",
+        "realtime: the last set-point holds; lockstep: the plant sends the set-points again",
         relayed("sp", lambda: drop_all, seconds=1.0),
         relayed=("sp",),
         silence=3.0,
     ),
     Fault(
         "sp-late",
-        "set-points that come two samples late hold until then",
+        "the old set-point holds until the late one comes",
         relayed("sp", lambda: late_by(2), seconds=LONG),
         REALTIME,
         relayed=("sp",),
     ),
     Fault(
         "op-lost",
-        "OPs that do not arrive: the plant holds OP and says so; they are no evidence of a "
-        "stuck valve",
+        "the plant holds OP and reports it; a lost OP does not count as a stuck valve",
         relayed("op", lambda: drop_all, seconds=LONG),
         relayed=("op",),
         notices=(Notice("plant", "error", REALTIME),),
@@ -117,7 +116,8 @@ FAULTS = (
     ),
     Fault(
         "op-late",
-        "OPs that come three samples late are counted, warned of, and no evidence of a stuck valve",
+        "OPs that come three samples late are counted and reported; they do not count as a "
+        "stuck valve",
         relayed("op", lambda: late_by(3), seconds=LONG),
         REALTIME,
         relayed=("op",),
@@ -126,7 +126,7 @@ FAULTS = (
     ),
     Fault(
         "op-applied-lost",
-        "when nobody tells which OP is in force the control goes on by its own",
+        "without messages about the OP in force the controller goes on with its own OP",
         relayed("op_applied", lambda: drop_all, seconds=LONG),
         REALTIME,
         relayed=("op_applied",),

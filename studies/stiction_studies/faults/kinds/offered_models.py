@@ -142,7 +142,7 @@ REFUSED = "is refused in one sentence, without its text"
 FAULTS = (
     Fault(
         "swap",
-        "a model that is refused and one that is taken make no step late; f_S is not raised",
+        "neither a refused nor a taken model makes a step late; f_S is not raised",
         swap,
         phases=(Phase.BEFORE,),
         silence=0.5,
@@ -163,7 +163,7 @@ FAULTS = (
     ),
     Fault(
         "model-flood",
-        "two hundred models for later on do not make a step long",
+        "two hundred models that are due later do not make a step long",
         many,
         phases=(Phase.AFTER,),
     ),
@@ -181,13 +181,13 @@ FAULTS = (
     ),
     Fault(
         "poison-small",
-        "a friction of a fifth is refused, or taken and rolled back within the watch",
+        "a fifth of the true friction is refused, or taken and rolled back within the watch",
         poison(((1.0, 0.4),), 0.0),
         phases=(Phase.AFTER,),
     ),
     Fault(
         "poison-chain",
-        "a roll-back never goes to what was itself rolled back or doubted",
+        "a roll-back never returns to a model that was rolled back or doubted before",
         poison((*POISONS, *POISONS), 3.0),
         (Pace.REALTIME,),
         phases=(Phase.AFTER,),

@@ -113,7 +113,7 @@ FAULTS = (
     ),
     Fault(
         "parameters-refused",
-        "what cannot be is refused and leaves the old value in force",
+        "an impossible value is refused; the old value stays in force",
         refused,
         phases=(Phase.AFTER,),
     ),

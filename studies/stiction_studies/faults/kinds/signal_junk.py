@@ -119,7 +119,7 @@ FAULTS = (
     ),
     Fault(
         "pv-wild",
-        "PVs of 10⁶ and of 0 from elsewhere move OP no further than the loop itself does",
+        "PVs of 10⁶ and 0 from another sender move OP no further than the loop itself does",
         wild_pv,
         notices=SEEN,
     ),
@@ -154,7 +154,7 @@ FAULTS = (
     ),
     Fault(
         "op-applied-junk",
-        "what is said of the OP in force and cannot be is refused",
+        "an impossible message about the OP in force is refused",
         said("op_applied", (*MALFORMED, *STAMPS, {"values": 1e6, "offset": 1e5})),
         phases=(Phase.AFTER,),
     ),
@@ -180,7 +180,7 @@ FAULTS = (
     ),
     Fault(
         "clock-junk",
-        "a second simulated time stops neither loop nor recorder",
+        "a second simulated clock stops neither loop nor recorder",
         strange_clock,
         phases=(Phase.AFTER,),
     ),

@@ -119,8 +119,8 @@ def _wait_for_samples(loop: RunningLoop) -> None:
 FAULTS = (
     Fault(
         "controller-paused",
-        "OP stays where it is; then the newest sample is answered and the backlog passed over, "
-        "the friction in force stays",
+        "OP stays where it is; then the controller answers the newest sample, passes over the "
+        "backlog and keeps the friction in force",
         pause("controller"),
         REALTIME,
         notices=STOPPED,
@@ -128,14 +128,14 @@ FAULTS = (
     ),
     Fault(
         "controller-paused-in-lockstep",
-        "the plant waits and the run goes on as if nothing had been",
+        "the plant waits; then the run goes on unchanged",
         pause("controller", seconds=SHORT_PAUSE),
         LOCKSTEP,
         silence=math.inf,
     ),
     Fault(
         "controller-stutters",
-        "what comes too late is passed over; a late OP is no evidence of a stuck valve",
+        "late samples are passed over; a late OP does not count as a stuck valve",
         stutter,
         REALTIME,
     ),
@@ -160,7 +160,7 @@ FAULTS = (
     ),
     Fault(
         "all-paused",
-        "as after a sleep of the machine: everything goes on where it was, without a jump",
+        "all nodes go on where they were, without a jump of OP",
         pause("plant", "controller", "estimator", "recorder", seconds=SHORT_PAUSE),
         silence=math.inf,
     ),
