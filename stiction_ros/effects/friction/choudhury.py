@@ -31,9 +31,9 @@ class ChoudhuryStiction(SlipJumpPair):
     moves it. The law is for OP that is smooth from sample to sample. For noisy OP and for
     OP in steps take :class:`~stiction_ros.effects.KanoStiction`, which was made to mend this.
 
-    The rules follow the paper's text. After a rest of OP it names J for "no change of
-    direction"; direction is read as that of the last motion of the stem, since J after a
-    reversal would move the stem against OP. A later flowchart tests
+    The rules are those of the 2005 paper as others cite them. After a rest of OP the paper names J
+    for "no change of direction"; direction is read as that of the last motion of the stem, since J
+    after a reversal would move the stem against OP. A later flowchart tests
     \|u − χ\| > (S + J)/2 at the turning sample as well (M. A. A. S. Choudhury, M. Jain,
     S. L. Shah, Journal of Process Control 18, 2008, 232-243); that is not done here.
 
