@@ -17,15 +17,15 @@ from stiction_ros.gain.retuning import FASTEST, UNCHANGED, best_tuning, times_as
 from stiction_ros.identification.result import CauseKind, Identification
 from stiction_ros.records.record import Record
 
-# share of what comes by which a figure may miss it. One that would miss more in a loop at the 5th
-# or 95th percentile of those drawn is not given: the record does not tell what would come
+# share of what comes by which a promised figure may miss; a figure that misses more in the drawn
+# loop at the 5th or 95th percentile is not given
 AGREED = 0.25
 AGREED_NOW = 0.05  # the same as a share of now
 EMBEDDING_SAMPLES = 1000  # samples of a run of the embedding, the last ones
-TAKEN_OVER = 200  # samples before it that the controller takes over
+TAKEN_OVER = 200  # samples before this run that the controller takes over
 ENDS = (5.0, 95.0)  # percentiles of the draws that are given as interval
-# share by which a drawn loop may differ from the record in IAE and amplitude: what does not cycle
-# as recorded is not the loop that was recorded
+# share by which a drawn loop may differ from the record in IAE and amplitude; a loop that differs
+# more is not the recorded one
 REPEATS = 0.25
 # drawn loops that must repeat the record, the likeliest among them, for anything to be said
 FEWEST = 10

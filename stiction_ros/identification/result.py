@@ -10,6 +10,7 @@ from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.identification.friction import behaviour_of, find_law, first_values
 from stiction_ros.identification.judgement import Figures, VerdictKind
+from stiction_ros.processes import ArxOutput, Noise
 from stiction_ros.signals.free_run import driven, fitted_free_run
 
 Interval = tuple[float, float]
@@ -260,16 +261,9 @@ class OutputModel:
         drive = driven(self.b.values(), delays, [stems[valve] for valve in self.b], self.bias)
         return fitted_free_run(self.a, drive, measured)
 
-    def equation(self, noise_std: float, enters: str) -> dict[str, Any]:
-        """Return the entry of a loop model's ``process.outputs``, with white noise."""
-        return {
-            "name": self.name,
-            "a": [float(value) for value in self.a],
-            "b": {valve: [float(value) for value in taps] for valve, taps in self.b.items()},
-            "delay": {valve: int(delay) for valve, delay in self.delay.items()},
-            "bias": float(self.bias),
-            "noise": {"std": float(noise_std), "enters": enters},
-        }
+    def equation(self, noise: Noise) -> ArxOutput:
+        """Return the equation as a process takes it, with this noise."""
+        return ArxOutput(self.name, self.a, self.b, self.delay, self.bias, noise)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -59,6 +60,17 @@ class ArxOutput:
                 raise InputError(f"delay of {valve} is negative", where=self.name)
             if not self.b[valve]:
                 raise InputError(f"b of {valve} is empty", where=self.name)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the entry of ``process.outputs`` in a loop model."""
+        return {
+            "name": self.name,
+            "a": [float(value) for value in self.a],
+            "b": {valve: [float(value) for value in taps] for valve, taps in self.b.items()},
+            "delay": {valve: int(delay) for valve, delay in self.delay.items()},
+            "bias": float(self.bias),
+            "noise": {"std": float(self.noise.std), "enters": self.noise.enters.value},
+        }
 
     @property
     def order(self) -> int:

@@ -1,5 +1,6 @@
 """The identified loop as a loop model, which plant, controller and ``gap`` load."""
 
+import dataclasses
 import math
 from typing import Any
 
@@ -16,6 +17,7 @@ from stiction_ros.identification.closed_loop.scaled_loop import (
 )
 from stiction_ros.identification.result import FitStatus, Identification, OutputModel, ValveEstimate
 from stiction_ros.loop import LoopModel
+from stiction_ros.processes import Noise
 from stiction_ros.records.record import Record
 from stiction_ros.signals.recovered_controller import RecoveredController
 
@@ -59,7 +61,7 @@ def identified_loop(record: Record, found: Identification, name: str) -> LoopMod
         "process": {
             "kind": "arx",
             "outputs": [
-                model.equation(white, "measurement") | {"bias": bias}
+                dataclasses.replace(model.equation(Noise(white)), bias=bias).to_mapping()
                 for model, bias, (white, _, _) in zip(found.outputs, biases, noises, strict=True)
             ],
         },

@@ -202,18 +202,7 @@ def _process_mapping(found: LinearIdentification) -> dict[str, Any]:
     """Return the ``process`` section of a loop model."""
     process = found.process
     if isinstance(process, ArxProcess):
-        outputs = [
-            {
-                "name": equation.name,
-                "a": list(equation.a),
-                "b": {valve: list(values) for valve, values in equation.b.items()},
-                "delay": dict(equation.delay),
-                "bias": equation.bias,
-                "noise": {"std": equation.noise.std, "enters": equation.noise.enters.value},
-            }
-            for equation in process.equations
-        ]
-        return {"kind": "arx", "outputs": outputs}
+        return {"kind": "arx", "outputs": [each.to_mapping() for each in process.equations]}
     model = found.linear_model
     return {
         "kind": "state_space",

@@ -26,6 +26,7 @@ from stiction_ros.online.estimator.friction_change import (
 )
 from stiction_ros.online.estimator.trust import TrustedFriction, TrustRule, ValveTrust, alike
 from stiction_ros.online.plain_settings import FitSchedule
+from stiction_ros.processes import Noise, NoiseEntry
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
 
@@ -341,7 +342,8 @@ class LiveEstimator:
             friction = trusted.get(name)
             effects = [] if friction is None else [friction.behaviour().to_mapping()]
             valves.append({"name": name, "effects": effects})
-        outputs = [output.equation(output.noise_std, "equation") for output in models]
+        equations = (one.equation(Noise(one.noise_std, NoiseEntry.EQUATION)) for one in models)
+        outputs = [equation.to_mapping() for equation in equations]
         provenance = [
             self._provenance(name, update, found.samples)
             for name in self.valves
