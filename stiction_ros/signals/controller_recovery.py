@@ -22,10 +22,9 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.signals.holds import stretches
+from stiction_ros.signals import holds
 from stiction_ros.signals.recovered_controller import (
     ControllerStatus,
-    LoopSignals,
     RecoveredController,
     Stretches,
 )
@@ -49,15 +48,18 @@ CLIPPED_RUN = 5  # samples in a row at its end of range from which on OP may res
 CLIPPED_LEVELS = 20
 
 
-def recover(signals: LoopSignals, longest_span: int) -> RecoveredController:
+def recover(
+    op: FloatArray, pv: FloatArray, sp: FloatArray | None, stretches: Stretches, longest_span: int
+) -> RecoveredController:
     """Return the controller between PV and OP.
 
     Args:
-        signals: of one loop.
+        op, pv: shape (N,).
+        sp: shape (N,), or None when not recorded.
+        stretches: first sample of each stretch in automatic and the one behind its last.
         longest_span: of h, samples; a third of the period of a cycle serves well.
     """
-    op, pv, sp = signals.op, signals.pv, signals.sp
-    rows = np.concatenate([np.arange(a, b) for a, b in signals.stretches] or [np.empty(0, int)])
+    rows = np.concatenate([np.arange(a, b) for a, b in stretches] or [np.empty(0, int)])
     rest = float(pv[rows].mean()) if len(rows) else 0.0
     set_point = np.full(len(pv), rest) if sp is None else sp
     limits = resting_limits(op[rows])
@@ -69,10 +71,10 @@ def recover(signals: LoopSignals, longest_span: int) -> RecoveredController:
     error = (set_point - pv) / scales[1]
     command = (op - float(op[rows].mean())) / scales[0]
     filtered = {
-        share: [smoothed(error[first:last], share) for first, last in signals.stretches]
+        share: [smoothed(error[first:last], share) for first, last in stretches]
         for share in FILTERS
     }
-    data = _Data(command, filtered, sp is None, signals.stretches, free)
+    data = _Data(command, filtered, sp is None, stretches, free)
     textbook = {
         span: _best(data, [_Form(lag, 0.0, False, span) for lag in LAGS])
         for span in SPANS
@@ -314,5 +316,5 @@ def resting_limits(op: FloatArray) -> tuple[float, float]:
 
 
 def _longest_run(there: BoolArray) -> int:
-    begins, ends = stretches(there)
+    begins, ends = holds.stretches(there)
     return int((ends - begins).max(initial=0))

@@ -47,13 +47,3 @@ class RecoveredController:
         if self.coefficients[1] == 0.0:
             return float("inf")
         return float(self.coefficients[0] / self.coefficients[1])
-
-
-@dataclasses.dataclass(frozen=True)
-class LoopSignals:
-    """What a controller reads and writes."""
-
-    op: FloatArray  # op, pv: shape (N,)
-    pv: FloatArray
-    sp: FloatArray | None  # shape (N,), or None when not recorded
-    stretches: Stretches  # first sample of each stretch in automatic and the one behind its last

@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -6,23 +8,19 @@ from known_loops import Kind, known
 
 from stiction_ros.records.record import Record
 from stiction_ros.signals.controller_recovery import recover
-from stiction_ros.signals.recovered_controller import (
-    ControllerStatus,
-    LoopSignals,
-    RecoveredController,
-)
+from stiction_ros.signals.recovered_controller import ControllerStatus, RecoveredController
 
 STICKY = Kind(friction=(3.0, 1.0), noise=0.05)
 
 
-def recovered(record: Record, **changes: object) -> RecoveredController:
-    signals = {
+def recovered(record: Record, **changes: Any) -> RecoveredController:
+    signals: dict[str, Any] = {
         "op": record.op[:, 0],
         "pv": record.pv[:, 0],
         "sp": None if record.sp is None else record.sp[:, 0],
         "stretches": [(0, len(record))],
     }
-    return recover(LoopSignals(**(signals | changes)), 12)
+    return recover(**(signals | changes), longest_span=12)
 
 
 @pytest.mark.parametrize("lag", [0, 1, 2])

@@ -20,11 +20,7 @@ from stiction_ros.signals.controller_recovery import recover
 from stiction_ros.signals.holds import holds
 from stiction_ros.signals.oscillation import Oscillation, amplitude, oscillation
 from stiction_ros.signals.outside_line import NO_LINE, OutsideLine, Predicted, beside, outside_line
-from stiction_ros.signals.recovered_controller import (
-    ControllerStatus,
-    LoopSignals,
-    RecoveredController,
-)
+from stiction_ros.signals.recovered_controller import ControllerStatus, RecoveredController
 
 UNSEEN_CYCLES = 10  # cycles that a record without an oscillation is taken to have room for
 SPAN_SHARE = 3.0  # spans of the controller's fit go up to the period over this
@@ -181,13 +177,8 @@ def paired(loop: ScaledLoop, periods: list[float]) -> list[tuple[int, RecoveredC
     table = {}
     for j in range(valves):
         for i in range(outputs):
-            signals = LoopSignals(
-                loop.op[:, j],
-                loop.pv[:, i],
-                None if loop.sp is None else loop.sp[:, i],
-                loop.stretches,
-            )
-            table[j, i] = recover(signals, round(periods[j] / SPAN_SHARE))
+            sp, span = None if loop.sp is None else loop.sp[:, i], round(periods[j] / SPAN_SHARE)
+            table[j, i] = recover(loop.op[:, j], loop.pv[:, i], sp, loop.stretches, span)
     chosen: dict[int, int] = {}
     for j, i in sorted(table, key=lambda key: -table[key].r_squared):
         if j not in chosen and i not in chosen.values():
