@@ -6,7 +6,6 @@ mean SE (14) wins. Nothing is shared between points: this is the baseline.
 """
 
 import itertools
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -16,7 +15,6 @@ from stiction_ros.errors import InputError
 from stiction_ros.paper import one_step_result as one_step
 from stiction_ros.paper.one_step_result import EquationError, fit_outputs
 from stiction_ros.paper.paper_options import PaperOptions
-from stiction_ros.paper.search_log import PaperIdentification
 from stiction_ros.paper.smoothed_laws import final_smoothing, smooth_law
 from stiction_ros.records.record import Record
 from stiction_ros.signals.arx_fit import ArxOrders, Delays
@@ -46,26 +44,14 @@ def count_points(record: Record, options: PaperOptions) -> int:
     return int(np.prod([side * (side + 1.0) / 2.0 for side in sides.tolist()]))
 
 
-def identify_by_grid(
-    record: Record, options: PaperOptions | None = None, progress: Progress | None = None
-) -> PaperIdentification:
-    """Identify by the grid search; the options have its ``grid_step``.
-
-    Raises:
-        InputError: a record that no model can be fitted to, a step coarser than the OP span,
-            or a grid of more than ``MAX_POINTS`` points.
-    """
-    begun = time.perf_counter()
-    options = options or PaperOptions(method="grid")
-    orders = one_step.check_record(record, options)
-    answer = search(record, options, orders, progress or (lambda share: None))
-    return one_step.result(record, options, answer, time.perf_counter() - begun)
-
-
 def search(
     record: Record, options: PaperOptions, orders: ArxOrders, progress: Progress
 ) -> one_step.Answer:
-    """Return the grid point and delays of lowest mean SE; see :func:`identify_by_grid`."""
+    """Return the grid point and delays of lowest mean SE; the options have its ``grid_step``.
+
+    Raises:
+        InputError: a step coarser than the OP span, or a grid of more than ``MAX_POINTS`` points.
+    """
     limits = one_step.friction_limits(record, options)
     if options.grid_step > limits.max():
         raise InputError(

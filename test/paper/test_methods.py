@@ -75,6 +75,6 @@ def test_swapped_columns_are_refused_before_a_slow_method_begins(
 ) -> None:
     record = loops.example1(1, samples=900)
     swapped = dataclasses.replace(record, op=record.pv, pv=record.op)
-    monkeypatch.setattr(nlp, "identify_by_programme", lambda *_: pytest.fail("it began"))
+    monkeypatch.setattr(nlp, "search_at_its_best", lambda *_: pytest.fail("it began"))
     with pytest.raises(InputError, match="look swapped"):
         identify(swapped, PaperOptions())

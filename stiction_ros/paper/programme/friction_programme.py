@@ -13,7 +13,6 @@ coefficients by the triangular factor of the regressors at that start, so that t
 them begins near a multiple of the identity. The Hessian is exact.
 """
 
-import dataclasses
 from typing import Any
 
 import casadi as ca
@@ -21,7 +20,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper.programme.programme_data import Frame, ProgrammeData
-from stiction_ros.paper.programme.reduced_programme import ALPHA
+from stiction_ros.paper.programme.reduced_programme import ALPHA, Solution
 from stiction_ros.signals.arx_fit import Delays, fit_arx
 
 FEASIBILITY = 1e-6
@@ -40,19 +39,6 @@ IPOPT = {
     "slack_bound_push": 1e-8,
     "slack_bound_frac": 1e-8,
 }
-
-
-@dataclasses.dataclass(frozen=True)
-class Solution:
-    """One end of IPOPT; a failure is a value."""
-
-    x: FloatArray  # scaled unknowns, shape (2m + p (n_a + m n_b + 1),)
-    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
-    objective: float  # (12a), squared engineering units
-    status: str  # IPOPT's own word
-    iterations: int  # of IPOPT
-    feasible: bool  # whether all constraints hold
-    stable: bool  # whether every identified A(q) has its roots inside the unit circle
 
 
 class FrictionProgramme:
@@ -110,7 +96,6 @@ class FrictionProgramme:
                 end, objective = polished, least
         finite = bool(np.isfinite(end).all() and np.isfinite(slack).all())
         return Solution(
-            x=end,
             friction=friction,
             objective=objective,
             status=str(stats["return_status"]),

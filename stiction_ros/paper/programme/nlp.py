@@ -11,7 +11,6 @@ of T choices of delays are spent:
 The best objective of a stable process wins.
 """
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -19,12 +18,12 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper import one_step_result as one_step
 from stiction_ros.paper.paper_options import PaperOptions
-from stiction_ros.paper.programme.friction_programme import FrictionProgramme, Solution
+from stiction_ros.paper.programme.friction_programme import FrictionProgramme
 from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.reduced_programme import (
     Criterion,
     ReducedProgramme,
-    ReducedSolution,
+    Solution,
     StemTable,
 )
 from stiction_ros.paper.programme.starts import (
@@ -35,10 +34,10 @@ from stiction_ros.paper.programme.starts import (
     candidates,
     draw_starts,
 )
-from stiction_ros.paper.search_log import PaperIdentification, SolvedStart
+from stiction_ros.paper.search_log import SolvedStart
 from stiction_ros.paper.smoothed_laws import final_smoothing
 from stiction_ros.records import Record
-from stiction_ros.signals.arx_fit import Delays
+from stiction_ros.signals.arx_fit import ArxOrders, Delays
 
 MAX_CHOICES = 500
 NO_END = "no start ended feasible with a stable process"
@@ -53,18 +52,13 @@ APART = 0.05  # of f_max: starts and ends nearer than that are one place
 Progress = Callable[[float], None]
 
 
-def identify_by_programme(
-    record: Record, options: PaperOptions | None = None, progress: Progress | None = None
-) -> PaperIdentification:
-    """Identify by the nonlinear programme (12); see the module for the order of work.
-
-    The status is ``no_model`` when no run ended feasible with a stable process.
-    """
-    begun = time.perf_counter()
-    options = options or PaperOptions()
-    search = _Search(record, options, progress or (lambda share: None))
+def search_at_its_best(
+    record: Record, options: PaperOptions, orders: ArxOrders, progress: Progress
+) -> one_step.Answer:
+    """Return the end of the nonlinear programme (12); see the module for the order of work."""
+    search = _Search(record, options, orders, progress)
     best = search.run()
-    answer = one_step.Answer(
+    return one_step.Answer(
         "" if best else NO_END,
         np.array(best.end) if best else np.zeros((len(record.valves), 2)),
         best.delays if best else search.choices[0],
@@ -72,13 +66,13 @@ def identify_by_programme(
         sum(one.criterion.evaluations for one in search.programmes.values()),
         starts=tuple(search.log),
     )
-    return one_step.result(record, options, answer, time.perf_counter() - begun)
 
 
 class _Search:
-    def __init__(self, record: Record, options: PaperOptions, progress: Progress) -> None:
+    def __init__(
+        self, record: Record, options: PaperOptions, orders: ArxOrders, progress: Progress
+    ) -> None:
         self.record, self.options, self.progress = record, options, progress
-        orders = one_step.check_record(record, options)
         self.choices = one_step.delay_choices(record, options, MAX_CHOICES)
         limits = one_step.friction_limits(record, options)
         self.table = StemTable(record, limits, orders, options.law)
@@ -173,9 +167,7 @@ class _Search:
         return Start(start.kind, friction)
 
 
-def solved(
-    start: Start, delays: Delays, end: ReducedSolution | Solution, stable: bool
-) -> SolvedStart:
+def solved(start: Start, delays: Delays, end: Solution, stable: bool) -> SolvedStart:
     """Return what one run of IPOPT came to, in plain numbers."""
     begun, ended = (
         tuple((float(static), float(dynamic)) for static, dynamic in friction)
@@ -200,17 +192,13 @@ def best_of(log: Sequence[SolvedStart]) -> SolvedStart | None:
     return min(accepted, key=lambda one: one.objective, default=None)
 
 
-def identify_as_printed(
-    record: Record, options: PaperOptions | None = None, progress: Progress | None = None
-) -> PaperIdentification:
-    """Identify by the method to the letter: (12) from M printed starts, for T delays.
+def search_as_printed(
+    record: Record, options: PaperOptions, orders: ArxOrders, progress: Progress
+) -> one_step.Answer:
+    """Return the end of the method to the letter: (12) from M printed starts, for T delays.
 
-    The best feasible, stable end of M × T runs of IPOPT at τ = 10⁴ wins; all else is as in
-    :func:`identify_by_programme`.
+    The best feasible, stable end of M × T runs of IPOPT at τ = 10⁴ wins.
     """
-    begun = time.perf_counter()
-    options = options or PaperOptions(method="nlp_printed")
-    orders = one_step.check_record(record, options)
     choices = one_step.delay_choices(record, options, MAX_CHOICES)
     limits = one_step.friction_limits(record, options)
     stictions = np.minimum(apparent_stictions(record), limits)
@@ -222,12 +210,11 @@ def identify_as_printed(
         programme = FrictionProgramme(data, delays)
         for start in starts:
             end = programme.solve(programme.start(start.friction), smoothing)
-            log.append(solved(start, delays, end, end.stable))
-            if progress is not None:
-                progress(len(log) / (len(choices) * len(starts)))
+            log.append(solved(start, delays, end, bool(end.stable)))
+            progress(len(log) / (len(choices) * len(starts)))
     accepted = best_of(log)
     best = accepted or min(log, key=lambda one: one.objective)
-    answer = one_step.Answer(
+    return one_step.Answer(
         "" if accepted else NO_END,
         np.array(best.end) if accepted else np.zeros((len(limits), 2)),
         best.delays,
@@ -235,4 +222,3 @@ def identify_as_printed(
         len(log),
         starts=tuple(log),
     )
-    return one_step.result(record, options, answer, time.perf_counter() - begun)

@@ -137,20 +137,17 @@ class Criterion:
 
 
 @dataclasses.dataclass(frozen=True)
-class ReducedSolution:
-    """Where one run of IPOPT came to."""
+class Solution:
+    """Where one run of IPOPT came to; a failure is a value."""
 
-    # rows (f_S, f_D), shape (m, 2), %; the best feasible point evaluated, or the start where none
-    # was feasible
-    friction: FloatArray
-    objective: float  # V there, squared engineering units; inf where nothing was feasible
+    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
+    objective: float  # (12a), squared engineering units
     status: str  # IPOPT's own word
     iterations: int  # of IPOPT
-
-    @property
-    def feasible(self) -> bool:
-        """Whether any point was feasible."""
-        return bool(np.isfinite(self.objective))
+    feasible: bool  # whether all constraints hold
+    # whether every identified A(q) has its roots inside the unit circle; None where the programme
+    # has none
+    stable: bool | None = None
 
 
 class ReducedProgramme:
@@ -165,8 +162,11 @@ class ReducedProgramme:
         self._callbacks: list[_Called] = []
         self._solver = self._build()
 
-    def solve(self, friction: FloatArray, width: float) -> ReducedSolution:
-        """Run IPOPT once from rows (f_S, f_D), shape (m, 2), %; ``width`` is a share of f_max."""
+    def solve(self, friction: FloatArray, width: float) -> Solution:
+        """Run IPOPT once from rows (f_S, f_D), shape (m, 2), %; ``width`` is a share of f_max.
+
+        The best feasible point that was evaluated is returned, or the start where none was.
+        """
         static, dynamic = np.asarray(friction, dtype=float).T / self.limits
         x = np.column_stack([static - dynamic, static + dynamic]).ravel()
         self._scale, self._width, self._best = 1.0, width, None
@@ -176,8 +176,9 @@ class ReducedProgramme:
         stats = self._solver.stats()
         status, iterations = str(stats["return_status"]), int(stats["iter_count"])
         if self._best is None:
-            return ReducedSolution(np.asarray(friction), float("inf"), status, iterations)
-        return ReducedSolution(self._best[1], self._best[0], status, iterations)
+            return Solution(np.asarray(friction), float("inf"), status, iterations, feasible=False)
+        value, found = self._best
+        return Solution(found, value, status, iterations, feasible=bool(np.isfinite(value)))
 
     def _friction(self, x: FloatArray) -> FloatArray:
         """Return rows (f_S, f_D), shape (m, 2), %, of (J, S) of every valve over f_max."""
