@@ -11,7 +11,7 @@ def main(samples: int = 3000) -> None:
     truth = LoopModel.load(find_config("tank.loop.yaml")).with_ideal_valves()
     record = prbs_experiment(truth, samples, seed=1)
     found = fit_linear(record, LinearOptions(delay=(0, 2)))  # state space, order by BIC
-    print(f"{found.kind}, {found.status}, poles {abs(found.poles).round(3).tolist()}")
+    print(f"{found.status}, poles {abs(found.poles).round(3).tolist()}")
     for i, output in enumerate(found.outputs):
         gains = ", ".join(
             f"{valve} {gain:.4f}" for valve, gain in zip(found.valves, found.gain[i], strict=True)

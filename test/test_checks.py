@@ -20,9 +20,9 @@ from stiction_ros.checks import LONGEST, number, one_of, shown
 from stiction_ros.control.result import ControlMode
 from stiction_ros.errors import InputError
 from stiction_ros.identification.friction import find_law
-from stiction_ros.identification.linear.data import LinearKind
 from stiction_ros.loop.yaml_reading import Section
 from stiction_ros.settings import from_mapping
+from stiction_ros.signals.subspace_projection import SubspaceMethod
 
 MODEL = LoopModel.load(find_config("example1_process.loop.yaml"))
 DESIGN = ControlSettings(horizon=30).design(MODEL)
@@ -97,7 +97,7 @@ def test_a_choice_is_taken_by_its_word_or_refused_with_the_closest() -> None:
         (lambda: IdentificationOptions(method="evidenz"), "method: .* did you mean evidence?"),
         (lambda: IdentificationOptions(kind="flo"), "kind: unknown kind 'flo'; .* mean flow?"),
         (lambda: find_law("chouhury"), "law: unknown friction law .* mean choudhury?"),
-        (lambda: LinearOptions(kind="arks"), "kind: unknown value 'arks'; use arx"),  # type: ignore[arg-type]
+        (lambda: LinearOptions(method="pca"), "method: unknown value 'pca'; .*cva"),  # type: ignore[arg-type]
         (lambda: LinearOptions(criterion="bix"), "criterion: .* did you mean bic?"),  # type: ignore[arg-type]
         (lambda: CsvColumns(op=3), "op: int is no list; give a column, a list of them, or"),
         (lambda: simulate("flow.loop.yaml"), "model: str is no LoopModel; give LoopModel.load"),  # type: ignore[arg-type]
@@ -111,7 +111,7 @@ def test_a_wrong_word_or_kind_gets_a_sentence(call: Callable[[], object], told: 
 
 
 def test_a_choice_may_be_said_by_its_text() -> None:
-    assert LinearOptions(kind="arx").kind is LinearKind.ARX  # type: ignore[arg-type]
+    assert LinearOptions(method="n4sid").method is SubspaceMethod.N4SID  # type: ignore[arg-type]
     assert MpcController(DESIGN, "unaware").mode is ControlMode.UNAWARE
     columns = CsvColumns(op="valve", pv=["flow", "level"])
     assert (columns.op, columns.pv) == ({"V1": "valve"}, {"PV1": "flow", "PV2": "level"})

@@ -25,21 +25,13 @@ def add(commands: Any) -> None:
         "when there is no stable model.",
     )
     intake.add_record(parser)
-    parser.add_argument(
-        "--kind",
-        default="state_space",
-        choices=searches.LINEAR_KINDS,
-        help="kind of model (state_space)",
-    )
     parser.add_argument("--order", type=int, metavar="N", help="number of states (default: by BIC)")
     parser.add_argument(
         "--method",
         default="cva",
         choices=searches.SUBSPACE_METHODS,
-        help="projection of state_space; predictor for records of a closed loop (cva)",
+        help="projection of the states; predictor for records of a closed loop (cva)",
     )
-    parser.add_argument("--na", type=int, metavar="N", help="order n_a (default: 1 to 3)")
-    parser.add_argument("--nb", type=int, metavar="N", help="order n_b (default: n_a)")
     parser.add_argument(
         "--criterion", default="bic", choices=searches.CRITERIA, help="criterion of the order (bic)"
     )
@@ -56,15 +48,12 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     loop = intake.opened(options)
     record = longest_part(loop.parts)
-    from stiction_ros.identification.linear.data import LinearKind, LinearStatus, OrderCriterion
+    from stiction_ros.identification.linear.data import LinearStatus, OrderCriterion
     from stiction_ros.identification.linear.fit import LinearOptions, fit_linear
     from stiction_ros.signals.subspace_projection import SubspaceMethod
 
     settings = LinearOptions(
-        kind=LinearKind(options.kind),
         order=options.order,
-        output_order=options.na,
-        input_order=options.nb,
         delay=options.delay,
         criterion=OrderCriterion(options.criterion),
         method=SubspaceMethod(options.method),
@@ -76,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json != "-":
         print(f"{loop.name}: {loop.summary}")
         _print(str(options.record), found)
-    if found.status in (LinearStatus.NO_MODEL, LinearStatus.UNSTABLE):
+    if found.status is LinearStatus.UNSTABLE:
         return 1
     if options.out is not None:
         searches.write_model(options.out, lambda name: found.loop_model(name, options.limits))
@@ -85,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _print(name: str, found: "LinearIdentification") -> None:
     console = Console()
-    title = f"{name}: {found.kind}, {found.samples} samples, {found.status}"
+    title = f"{name}: state space, {found.samples} samples, {found.status}"
     table = Table(title=title, title_justify="left")
     heads = ["output", "delay", "one step %", "free run %", "noise"]
     heads += [f"gain {valve}" for valve in found.valves]
@@ -116,29 +105,13 @@ def _number(value: complex) -> str:
 
 def _rivals(found: "LinearIdentification") -> Table:
     """Return the table of the orders that were tried; the one taken is marked."""
-    from stiction_ros.identification.linear.subspace import StateSpaceFit
-
-    heads = ["output", "order", "delay", "AIC", "BIC", "one step %", "free run %", "taken"]
+    heads = ["order", "AIC", "BIC", "one step %", "free run %", "taken"]
     table = Table(*heads, title="orders, AIC and BIC of the one-step error", title_justify="left")
-    if isinstance(found.detail, StateSpaceFit):
-        for rival in found.detail.rivals:
-            figures = (rival.aic, rival.bic, rival.fit_one_step, rival.fit_free_run)
-            taken = rival.order == found.detail.order
-            delays = " ".join(map(str, found.detail.delay))
-            _row(table, ("all", str(rival.order), delays), figures, taken)
-        return table
-    table.title = "orders, AIC and BIC of the free-run error"
-    for tag, choice in zip(found.outputs, found.detail, strict=True):
-        for fit in choice.best_of_each_order():
-            figures = (fit.aic, fit.bic, fit.fit_one_step, fit.fit_free_run)
-            orders = f"{fit.orders.output} {fit.orders.input}"
-            _row(table, (tag, orders, " ".join(map(str, fit.delays))), figures, fit is choice.fit)
+    for rival in found.rivals:
+        figures = [f"{rival.aic:.1f}", f"{rival.bic:.1f}"]
+        figures += [f"{fit.mean():.2f}" for fit in (rival.fit_one_step, rival.fit_free_run)]
+        table.add_row(str(rival.order), *figures, "yes" if rival.order == found.order else "")
     return table
-
-
-def _row(table: Table, head: tuple[str, ...], figures: tuple[float, ...], taken: bool) -> None:
-    shown = [f"{value:.1f}" for value in figures[:2]] + [f"{value:.2f}" for value in figures[2:]]
-    table.add_row(*head, *shown, "yes" if taken else "")
 
 
 def limits_range(text: str) -> tuple[float, float]:

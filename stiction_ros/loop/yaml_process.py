@@ -92,18 +92,13 @@ def _read_state_space(
     a, b, c = section.matrix("a"), section.matrix("b"), section.matrix("c")
     e = section.matrix("e") if "e" in section else np.zeros((len(a), 0))
     op0, pv0 = _read_point(point, valves, names)
-    late = section.section("delay", {})
-    delays = [late.integer(valve, 0) for valve in valves]
-    late.finish()
+    entry = section.section("delay", {})
+    delays = [entry.integer(valve, 0) for valve in valves]
+    entry.finish()
     try:
-        for j, delay in enumerate(delays):
-            for _ in range(delay):  # the stem of a sample before is one more state
-                a = np.block([[a, b[:, j : j + 1]], [np.zeros((1, len(a) + 1))]])
-                b = np.pad(b, ((0, 1), (0, 0)))
-                b[:, j] = np.eye(len(b))[-1]
-                c, e = np.pad(c, ((0, 0), (0, 1))), np.pad(e, ((0, 1), (0, 0)))
         model = processes.LinearModel(a, b, c, e, np.zeros(len(a)), op0, pv0)
-        return processes.StateSpaceProcess(model, valves, names, noise, measured)
+        late = model.behind_delays(delays)
+        return processes.StateSpaceProcess(late, valves, names, noise, measured)
     except InputError as error:
         raise error.within(section.where) from None
 

@@ -4,6 +4,7 @@ import dataclasses
 import enum
 import itertools
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -64,6 +65,18 @@ class LinearModel:
             return np.asarray(self.c @ np.linalg.solve(np.eye(self.order) - self.a, self.b))
         except np.linalg.LinAlgError:
             return np.full((len(self.pv0), len(self.stem0)), np.inf)
+
+    def behind_delays(self, delays: Sequence[int]) -> "LinearModel":
+        """Return the model with each stem late by its delay, samples: a further state for each."""
+        a, b, c, e, constant = self.a, self.b, self.c, self.e, self.constant
+        for j, delay in enumerate(delays):
+            for _ in range(delay):  # the stem of a sample before is one more state
+                a = np.block([[a, b[:, j : j + 1]], [np.zeros((1, len(a) + 1))]])
+                b = np.pad(b, ((0, 1), (0, 0)))
+                b[:, j] = np.eye(len(b))[-1]
+                c, e = np.pad(c, ((0, 0), (0, 1))), np.pad(e, ((0, 1), (0, 0)))
+                constant = np.append(constant, 0.0)
+        return LinearModel(a, b, c, e, constant, self.stem0, self.pv0)
 
     def step_responses(self, samples: int) -> FloatArray:
         """Return responses, (N, p, m), to stem steps of 1 % at sample 0, without ``constant``."""

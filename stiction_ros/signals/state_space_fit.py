@@ -55,42 +55,10 @@ def realise(sequence: StateSequence, order: int, u: FloatArray, y: FloatArray) -
     output, residual = _regress(y[:, s:], np.vstack([now, ones]))
     dynamics, _ = _regress(later, np.vstack([now, ones, u[:, s:], residual]))
     a, b, k = dynamics[:, :n], dynamics[:, n + 1 : n + 1 + len(u)], dynamics[:, n + 1 + len(u) :]
-    return _with_constant(a, b, output[:, :n], k, dynamics[:, n], output[:, n])
-
-
-def realise_by_shift(
-    sequence: StateSequence, order: int, u: FloatArray, y: FloatArray
-) -> Realisation:
-    """Return the matrices of the first ``order`` states, A from the observability matrix.
-
-    The rows of Γ one block down are Γ Ã, with Ã = A or A − K C. B and K then follow from ξ one
-    sample later on χ and on the innovations, or on y. A record in which OP is as good as a
-    function of PV leaves the regression of :func:`realise` without a unique A; this one has it.
-    """
-    s, n, p, m = sequence.horizon, order, len(y), len(u)
-    observability = sequence.observability[:, :n]
-    transition: FloatArray = np.asarray(
-        np.linalg.lstsq(observability[:-p], observability[p:], rcond=1e-10)[0], dtype=float
-    )
-    c = observability[:p]
-    states = sequence.states[:n]
-    now, later = states[:, :-1], states[:, 1:]
-    ones = np.ones((1, now.shape[1]))
-    offset = (y[:, s:] - c @ now).mean(axis=1)
-    drive = y[:, s:] if sequence.predicting else y[:, s:] - c @ now - offset[:, None]
-    dynamics, _ = _regress(later - transition @ now, np.vstack([ones, u[:, s:], drive]))
-    b, k, shift = dynamics[:, 1 : 1 + m], dynamics[:, 1 + m :], dynamics[:, 0]
-    if sequence.predicting:
-        transition, shift = transition + k @ c, shift + k @ offset
-    return _with_constant(transition, b, c, k, shift, offset)
-
-
-def _with_constant(
-    a: FloatArray, b: FloatArray, c: FloatArray, k: FloatArray, shift: FloatArray, y0: FloatArray
-) -> Realisation:
-    """Move the constant ``shift`` of the state equation into the offset."""
-    rest = np.linalg.lstsq(np.eye(len(a)) - a, shift, rcond=None)[0]
-    return Realisation(a, b, c, k, np.zeros(len(a)), y0 + c @ rest)
+    # The constant of the state equation moves into the offset.
+    rest = np.linalg.lstsq(np.eye(n) - a, dynamics[:, n], rcond=None)[0]
+    c = output[:, :n]
+    return Realisation(a, b, c, k, np.zeros(n), output[:, n] + c @ rest)
 
 
 def with_best_gain(

@@ -23,14 +23,12 @@ RANK = 1e-10  # singular values below this share of the largest count as zero
 class SubspaceMethod(enum.StrEnum):
     """Which projection gives the states.
 
-    ``N4SID``, ``MOESP`` and ``CVA`` weight one oblique projection differently. They want
-    inputs that do not depend on past noise, as in an open-loop experiment. ``PREDICTOR`` takes
-    the projection from a long ARX predictor; it needs no future inputs and stays consistent in
-    closed loop.
+    ``N4SID`` and ``CVA`` weight one oblique projection differently. They want inputs that do not
+    depend on past noise, as in an open-loop experiment. ``PREDICTOR`` takes the projection from a
+    long ARX predictor; it needs no future inputs and stays consistent in closed loop.
     """
 
     N4SID = "n4sid"
-    MOESP = "moesp"
     CVA = "cva"
     PREDICTOR = "predictor"
 
@@ -40,9 +38,6 @@ class StateSequence:
     """States up to similarity, ordered by weight."""
 
     states: FloatArray  # shape (n_max, N − s + 1); column 0 belongs to sample s
-    # C, C Ã, … C Ã^(s−1) stacked, shape (s p, n_max), with Ã = A, or A − K C where ``predicting``
-    observability: FloatArray
-    predicting: bool  # whether the projection is that of ``PREDICTOR``
     singular_values: FloatArray  # all of the weighted projection, falling
     horizon: int  # s
 
@@ -71,8 +66,7 @@ def state_sequence(
         max_order: most states returned.
         method: see :class:`SubspaceMethod`.
     """
-    predicting = method is SubspaceMethod.PREDICTOR
-    if predicting:
+    if method is SubspaceMethod.PREDICTOR:
         mapping, left, values = _predictor(u, y, horizon)
         weight = np.eye(len(mapping))
     else:
@@ -82,8 +76,7 @@ def state_sequence(
     root = np.sqrt(values[:n])
     to_state = (left[:, :n].T @ weight @ mapping) / root[:, None]
     past = hankel_rows(np.vstack([u, y]), 0, horizon, u.shape[1] - horizon + 1)
-    observability = np.linalg.pinv(weight, rcond=RANK) @ left[:, :n] * root
-    return StateSequence(to_state @ past, observability, predicting, values, horizon)
+    return StateSequence(to_state @ past, values, horizon)
 
 
 def _lower(blocks: list[FloatArray]) -> FloatArray:
@@ -108,10 +101,10 @@ def _oblique(
     l21, l22 = lower[i:j, :i], lower[i:j, i:j]
     l32, l33 = lower[j:, i:j], lower[j:, j:]
     mapping = l32 @ np.linalg.pinv(l22, rcond=RANK)
-    weight = np.eye(len(future))
+    weight, body = np.eye(len(future)), mapping @ np.hstack([l21, l22])
     if method is SubspaceMethod.CVA:
         weight = _inverse_root(np.hstack([l32, l33]))
-    body = mapping @ np.hstack([l21, l22]) if method is SubspaceMethod.N4SID else weight @ l32
+        body = weight @ l32
     left, values, _ = np.linalg.svd(body, full_matrices=False)
     return mapping, left, values, weight
 

@@ -7,7 +7,7 @@ from stiction_ros.identification import METHODS
 from stiction_ros.identification.answer.advice import EXPECTED
 from stiction_ros.identification.friction import laws
 from stiction_ros.identification.identification_options import LOOP_KINDS
-from stiction_ros.identification.linear.data import LinearKind, OrderCriterion
+from stiction_ros.identification.linear.data import OrderCriterion
 from stiction_ros.paper.paper_options import METHOD_NAMES
 from stiction_ros.signals.subspace_projection import SubspaceMethod
 
@@ -17,7 +17,6 @@ def test_every_choice_is_known_and_none_is_missing() -> None:
     assert METHOD_NAMES == searches.PAPER_METHODS
     assert set(searches.laws()) == set(laws())
     assert tuple(EXPECTED) == searches.LOOP_KINDS == LOOP_KINDS
-    assert tuple(kind.value for kind in LinearKind) == searches.LINEAR_KINDS
     assert tuple(criterion.value for criterion in OrderCriterion) == searches.CRITERIA
     assert tuple(method.value for method in SubspaceMethod) == searches.SUBSPACE_METHODS
 

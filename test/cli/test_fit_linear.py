@@ -36,15 +36,13 @@ def test_experiment_says_how_to_read_its_record(
     assert json.loads(capsys.readouterr().out)["samples"] == 300
 
 
-@pytest.mark.parametrize("kind", ["arx", "state_space"])
 def test_fit_linear_prints_the_contract_as_json(
-    kind: str, prbs: Path, capsys: pytest.CaptureFixture[str]
+    prbs: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["fit-linear", str(prbs), *COLUMNS, "--kind", kind, "--delay", "0", "--json", "-"]
-    assert main(arguments) == 0
+    assert main(["fit-linear", str(prbs), *COLUMNS, "--delay", "0", "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["record"] == str(prbs)
-    assert found["model"]["kind"] == kind
+    assert found["model"]["kind"] == "state_space"
     gains = [list(output["gain"].values()) for output in found["outputs"]]
     assert np.array(gains) == pytest.approx(np.array([[0.025, 0.0], [-0.173, 0.297]]), abs=0.03)
 
@@ -53,16 +51,15 @@ def test_tables_show_both_fits_gains_and_poles(
     prbs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "160")
-    assert main(["fit-linear", str(prbs), *COLUMNS, "--kind", "arx", "--delay", "0"]) == 0
+    assert main(["fit-linear", str(prbs), *COLUMNS, "--delay", "0"]) == 0
     shown = capsys.readouterr().out
     for text in ("one step %", "free run %", "gain V1", "gain V2", "poles: 0.9", "AIC", "taken"):
         assert text in shown
 
 
-@pytest.mark.parametrize("kind", ["arx", "state_space"])
-def test_loop_model_that_is_written_runs_the_tank(kind: str, prbs: Path, tmp_path: Path) -> None:
+def test_loop_model_that_is_written_runs_the_tank(prbs: Path, tmp_path: Path) -> None:
     path = tmp_path / "found.loop.yaml"
-    arguments = ["fit-linear", str(prbs), *COLUMNS, "--kind", kind, "--delay", "0"]
+    arguments = ["fit-linear", str(prbs), *COLUMNS, "--delay", "0"]
     assert main([*arguments, "--limits", "0:100", "--out", str(path)]) == 0
     model = LoopModel.load(path)
     assert model.name == "found"
@@ -108,10 +105,6 @@ def test_what_cannot_be_used_is_one_line_and_exit_2(
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
-
-
-def test_options_of_another_kind_are_exit_2(prbs: Path) -> None:
-    assert main(["fit-linear", str(prbs), *COLUMNS, "--kind", "arx", "--order", "2"]) == 2
 
 
 @pytest.mark.parametrize("text", ["100:0", "0", "a:b", "0:inf"])

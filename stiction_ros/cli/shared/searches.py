@@ -20,9 +20,8 @@ T = TypeVar("T", int, float)
 LOOP_KINDS = ("flow", "pressure", "level", "temperature", "analyser")
 PAPER_METHODS = ("nlp", "nlp_printed", "grid")
 METHODS = ("exact", "evidence", *PAPER_METHODS)
-LINEAR_KINDS = ("arx", "state_space")
 CRITERIA = ("aic", "bic")
-SUBSPACE_METHODS = ("n4sid", "moesp", "cva", "predictor")
+SUBSPACE_METHODS = ("n4sid", "cva", "predictor")
 
 # Option: where its value goes, and the methods that have it.
 OWNERS = {

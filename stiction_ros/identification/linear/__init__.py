@@ -1,1 +1,1 @@
-"""Linear models of whole records: ARX, ARMAX, state space."""
+"""Linear models of whole records, state space."""

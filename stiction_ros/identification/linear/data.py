@@ -17,24 +17,16 @@ from stiction_ros.records.record import Record
 MIN_SAMPLES = 40
 
 
-class LinearKind(enum.StrEnum):
-    """Structure of a linear model from stem positions (or OP) to PV."""
-
-    ARX = "arx"
-    STATE_SPACE = "state_space"
-
-
 class LinearStatus(enum.StrEnum):
     """How a linear fit ended; everything but ``OK`` asks for a look at ``reason``.
 
-    ``CONSTRAINED``: the best model was unstable, the model given is the best stable one that
-    the search found. ``UNSTABLE``: the model given has a pole on or outside the unit circle.
+    ``CONSTRAINED``: an unstable order does clearly better one step ahead than the stable one that
+    is given. ``UNSTABLE``: the model given has a pole on or outside the unit circle.
     """
 
     OK = "ok"
     CONSTRAINED = "constrained"
     UNSTABLE = "unstable"
-    NO_MODEL = "no_model"
 
 
 class OrderCriterion(enum.StrEnum):
@@ -110,14 +102,3 @@ def nrmse_fit(y: FloatArray, predicted: FloatArray) -> float:
     if not np.isfinite(error):
         return float("-inf")
     return 100.0 * (1.0 - error / max(float(np.linalg.norm(y - y.mean())), 1e-300))
-
-
-def information(mean_square: float, count: int, parameters: int) -> tuple[float, float]:
-    """Return (AIC, BIC): n log(mean square) + 2k, n log(mean square) + k log n.
-
-    Both are inf where the mean square is not finite.
-    """
-    if not np.isfinite(mean_square):
-        return float("inf"), float("inf")
-    likelihood = count * float(np.log(max(mean_square, 1e-300)))
-    return likelihood + 2.0 * parameters, likelihood + parameters * float(np.log(count))

@@ -1,39 +1,27 @@
-"""One face for the linear models of a whole record: ARX and state space."""
+"""A state-space model of a whole record: its delays, its order, remarks."""
 
 import dataclasses
 import os
 import time
 from collections.abc import Callable
 
-import numpy as np
-
 from stiction_ros.checks import of_kind, one_of
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.linear.data import (
     LinearData,
-    LinearKind,
     LinearStatus,
     OrderCriterion,
     prepare_linear,
 )
-from stiction_ros.identification.linear.orders import OrderChoice, OrderOptions, choose_orders
-from stiction_ros.identification.linear.result import (
-    LinearIdentification,
-    arx_result,
-    state_space_result,
-)
-from stiction_ros.identification.linear.subspace import (
-    StateSpaceFit,
-    SubspaceOptions,
-    fit_state_space,
-)
+from stiction_ros.identification.linear.delays import valve_delays
+from stiction_ros.identification.linear.result import LinearIdentification, in_engineering_units
+from stiction_ros.identification.linear.subspace import OrderChoice, choose_order
 from stiction_ros.intake.intake import record_of
 from stiction_ros.records.record import Record
 from stiction_ros.signals.subspace_projection import SubspaceMethod
 from stiction_ros.signals.velocity_form import explained
 
-DEFAULT_ORDERS = (1, 2, 3)
 CONTROLLER_SHARE = 0.98
 CLOSED_LOOP = (
     "the record has set-points, so a controller was at work; the method predictor allows for it",
@@ -46,53 +34,35 @@ class LinearOptions:
     """Options of :func:`fit_linear`.
 
     Attributes:
-        kind: structure of the model.
-        order: n of a state-space model; None chooses.
-        output_order, input_order: n_a and n_b of ARX; None chooses n_a among 1, 2 and 3 and takes
-            n_b = n_a.
+        order: n; None chooses.
         delay: inclusive range of t_d, samples.
-        criterion: AIC or BIC, for every order that is not given.
-        method: projection of the state-space model.
+        criterion: AIC or BIC, for an order that is not given.
+        method: projection; ``predictor`` for records of a closed loop.
 
     Raises:
-        InputError: orders that do not belong to the structure.
+        InputError: an order or a delay out of range.
 
     Examples:
         >>> from stiction_ros import LinearOptions
-        >>> LinearOptions(order=2).kind.value
-        'state_space'
+        >>> LinearOptions(order=2).method.value
+        'cva'
     """
 
-    kind: LinearKind = LinearKind.STATE_SPACE
     order: int | None = None
-    output_order: int | None = None
-    input_order: int | None = None
     delay: tuple[int, int] = (0, 0)
     criterion: OrderCriterion = OrderCriterion.BIC
     method: SubspaceMethod = SubspaceMethod.CVA
 
     def __post_init__(self) -> None:
-        for key, kind in (
-            ("kind", LinearKind),
-            ("criterion", OrderCriterion),
-            ("method", SubspaceMethod),
-        ):
+        for key, kind in (("criterion", OrderCriterion), ("method", SubspaceMethod)):
             object.__setattr__(self, key, one_of(getattr(self, key), kind, key))
-        space = self.kind is LinearKind.STATE_SPACE
-        polynomial = (self.output_order, self.input_order)
-        if space and any(value is not None for value in polynomial):
-            raise InputError("n_a and n_b belong to arx", fix="give the order n")
-        if not space and self.order is not None:
-            raise InputError(f"{self.kind} has no order n", where="order", fix="give na and nb")
-
-    def polynomial(self) -> OrderOptions:
-        """Return what the orders of ARX are chosen from."""
-        return OrderOptions(
-            output=DEFAULT_ORDERS if self.output_order is None else (self.output_order,),
-            input=() if self.input_order is None else (self.input_order,),
-            delay=self.delay,
-            criterion=self.criterion,
-        )
+        if self.order is not None and not 1 <= self.order <= 100:
+            raise InputError(f"{self.order} lies outside 1 to 100", where="order")
+        low, high = self.delay
+        if not 0 <= low <= high:
+            raise InputError(
+                f"{low}:{high} is no delay range", where="delay", fix="use LO:HI, 0 <= LO <= HI"
+            )
 
 
 def fit_linear(
@@ -128,17 +98,8 @@ def fit_linear(
     begun = time.perf_counter()
     record = record_of(record)
     options = LinearOptions() if options is None else of_kind(options, LinearOptions, "options")
-    report = progress or (lambda share: None)
     data = prepare_linear(record, stem)
-    if options.kind is LinearKind.STATE_SPACE:
-        found = state_space_result(data, _state_space(data, options))
-    else:
-        choices: list[OrderChoice] = []
-        for i in range(len(data.outputs)):
-            choices.append(choose_orders(data, i, options.polynomial()))
-            report((i + 1) / len(data.outputs))
-        found = arx_result(data, tuple(choices))
-    report(1.0)
+    found = in_engineering_units(data, _best(data, options, progress), options.method)
     low, high = options.delay
     notes = tuple(
         f"the delay from valve {valve} to {output} is the longest tried; widen --delay"
@@ -146,8 +107,8 @@ def fit_linear(
         for j, valve in enumerate(found.valves)
         if found.delay[i, j] == high > low
     )
-    if options.kind is LinearKind.STATE_SPACE and options.method is not SubspaceMethod.PREDICTOR:
-        notes += CLOSED_LOOP if record.sp is not None else ()
+    if options.method is not SubspaceMethod.PREDICTOR and record.sp is not None:
+        notes += CLOSED_LOOP
     shares = [explained(op, record.pv) for op in record.op.T]
     notes += tuple(
         f"a PI law of PV explains the moves of {valve} (R² {share:.3f}): the record tells no "
@@ -159,28 +120,21 @@ def fit_linear(
     return dataclasses.replace(found, seconds=seconds, notes=(*record.notes, *notes))
 
 
-def _state_space(data: LinearData, options: LinearOptions) -> StateSpaceFit:
+def _best(data: LinearData, options: LinearOptions, progress: Progress | None) -> OrderChoice:
     """Return the better of the least delays and of those that ARX equations show."""
     low, high = options.delay
-    wanted = SubspaceOptions(
-        order=options.order, method=options.method, criterion=options.criterion
-    )
     tried = [(low,) * len(data.valves)]
     if high > low:
-        rows = [
-            choose_orders(data, i, OrderOptions(output=(2,), delay=options.delay)).fit.delays
-            for i in range(len(data.outputs))
-        ]
-        # A delay belongs to the valve, so the output that answers first decides.
-        tried.append(tuple(int(d) for d in np.min(rows, axis=0)))
-    fits, longest = [], max(map(max, tried))
+        tried.append(valve_delays(data, low, high))
+    choices, longest = [], max(map(max, tried))
     for delay in tried:  # on one window
         late = longest - max(delay)
         part = dataclasses.replace(data, u=data.u[:, late:], y=data.y[:, late:])
-        fits.append(fit_state_space(part, dataclasses.replace(wanted, delay=delay)))
+        choices.append(choose_order(part, delay, options.order, options.method, options.criterion))
+        if progress is not None:
+            progress(len(choices) / len(tried))
 
-    def rank(fit: StateSpaceFit) -> tuple[bool, float]:
-        values = [row.value(options.criterion) for row in fit.rivals if row.order == fit.order]
-        return fit.status is not LinearStatus.OK, min(values, default=float("inf"))
+    def rank(choice: OrderChoice) -> tuple[bool, float]:
+        return choice.status is not LinearStatus.OK, choice.taken.value(options.criterion)
 
-    return min(fits, key=rank)
+    return min(choices, key=rank)

@@ -8,32 +8,33 @@ from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.identification.linear.data import LinearData, LinearKind, LinearStatus
-from stiction_ros.identification.linear.orders import OrderChoice
-from stiction_ros.identification.linear.subspace import StateSpaceFit
+from stiction_ros.identification.linear.data import LinearData, LinearStatus
+from stiction_ros.identification.linear.subspace import OrderChoice, OrderRival
 from stiction_ros.loop import LoopModel
-from stiction_ros.processes import ArxProcess, LinearModel, Noise, StateSpaceProcess
-from stiction_ros.processes.linear_process import LinearProcess
+from stiction_ros.processes import LinearModel
+from stiction_ros.signals.subspace_projection import SubspaceMethod
 
 
 @dataclasses.dataclass(frozen=True)
 class LinearIdentification:
-    """Every output of a record as one linear model.
+    """Every output of a record as one state-space model.
 
     Attributes:
-        kind: structure.
-        status: the worst of the parts.
+        status: how the fit ended.
         reason: one sentence; empty when ok.
         record: name of the record.
         samples, sample_time: of the record, seconds.
         valves, outputs: tags.
+        method: projection of the states.
         delay: t_d in samples, shape (p, m).
-        gain: DC gain in engineering units per %, shape (p, m).
-        poles: of all outputs for state space, else of each output in turn.
+        a, b, c, k: A (n, n), B (n, m) per %, C (p, n) and K (n, p), in engineering units,
+            without the delays.
+        x0: state at the first sample after the delays, shape (n,).
+        stem0, pv0: operating point χ_0 (m,), % and y_0 (p,): the offset of the model.
         noise_std: of the one-step error, shape (p,), engineering units.
         fit_one_step, fit_free_run: NRMSE fit, %, shape (p,).
-        process: the deterministic part as plants and controllers take it; None without model.
-        detail: the fits behind it, with their rivals.
+        singular_values: of the weighted projection, falling.
+        rivals: the orders tried.
         seconds: wall time spent.
         notes: remarks for people.
 
@@ -46,7 +47,6 @@ class LinearIdentification:
         ('PV1',)
     """
 
-    kind: LinearKind
     status: LinearStatus
     reason: str
     record: str
@@ -54,14 +54,20 @@ class LinearIdentification:
     sample_time: float
     valves: tuple[str, ...]
     outputs: tuple[str, ...]
+    method: SubspaceMethod
     delay: NDArray[np.int64]
-    gain: FloatArray
-    poles: NDArray[np.complex128]
+    a: FloatArray
+    b: FloatArray
+    c: FloatArray
+    k: FloatArray
+    x0: FloatArray
+    stem0: FloatArray
+    pv0: FloatArray
     noise_std: FloatArray
     fit_one_step: FloatArray
     fit_free_run: FloatArray
-    process: LinearProcess | None
-    detail: StateSpaceFit | tuple[OrderChoice, ...]
+    singular_values: FloatArray
+    rivals: tuple[OrderRival, ...]
     seconds: float = 0.0
     notes: tuple[str, ...] = ()
 
@@ -70,19 +76,30 @@ class LinearIdentification:
             f"{name} {free:.0f} %"
             for name, free in zip(self.outputs, self.fit_free_run.tolist(), strict=True)
         )
-        said = f"free-run fit {fit}" if self.process is not None else self.reason
-        return f"<LinearIdentification {self.kind} {self.status}: {said}; {self.samples} samples>"
+        return f"<LinearIdentification {self.status}: free-run fit {fit}; {self.samples} samples>"
+
+    @property
+    def order(self) -> int:
+        """Number n of states without the delays."""
+        return len(self.a)
+
+    @property
+    def poles(self) -> NDArray[np.complex128]:
+        """Eigenvalues of A, largest first, shape (n,); the delays' zeros left out."""
+        poles = np.linalg.eigvals(self.a).astype(complex)
+        return poles[np.argsort(-np.abs(poles), kind="stable")]
+
+    @property
+    def gain(self) -> FloatArray:
+        """C (I − A)⁻¹ B, shape (p, m), engineering units per %; the DC gain when stable."""
+        return self.linear_model.gain
 
     @property
     def linear_model(self) -> LinearModel:
-        """The process as matrices.
-
-        Raises:
-            InputError: there is no model.
-        """
-        if self.process is None:
-            raise InputError(self.reason, where=self.record, fix="try another order")
-        return self.process.model
+        """The process as matrices, its delays as further states."""
+        n, none = self.order, np.zeros((self.order, 0))
+        model = LinearModel(self.a, self.b, self.c, none, np.zeros(n), self.stem0, self.pv0)
+        return model.behind_delays(self.delay[0].tolist())
 
     def loop_model(self, name: str, limits: tuple[float, float] | None = None) -> LoopModel:
         """Return the loop with ideal valves, this process, and where it came from.
@@ -92,185 +109,113 @@ class LinearIdentification:
             limits: of every valve, %; None leaves them out.
 
         Raises:
-            InputError: there is no model, or it is unstable.
+            InputError: the model is unstable.
         """
-        if self.status in (LinearStatus.NO_MODEL, LinearStatus.UNSTABLE):
+        if self.status is LinearStatus.UNSTABLE:
             raise InputError(self.reason, where=self.record, fix="try another order")
-        valves: list[dict[str, Any]] = [{"name": valve, "effects": []} for valve in self.valves]
-        if limits is not None:
-            for valve in valves:
-                valve["limits"] = list(limits)
-        model = self.linear_model
+        ends = {} if limits is None else {"limits": list(limits)}
+        noise = [{"std": std, "enters": "measurement"} for std in self.noise_std.tolist()]
+        process = {
+            "kind": "state_space",
+            "delay": dict(zip(self.valves, self.delay[0].tolist(), strict=True)),
+            **{key: getattr(self, key).tolist() for key in ("a", "b", "c")},
+            "outputs": [
+                {"name": tag, "noise": one} for tag, one in zip(self.outputs, noise, strict=True)
+            ],
+        }
+        provenance = {
+            "what": "process",
+            "kind": "state_space",
+            "record": self.record,
+            "samples": self.samples,
+            "status": self.status.value,
+            "fit_one_step": dict(zip(self.outputs, self.fit_one_step.tolist(), strict=True)),
+            "fit_free_run": dict(zip(self.outputs, self.fit_free_run.tolist(), strict=True)),
+            "method": self.method.value,
+            "order": self.order,
+            "kalman_gain": self.k.tolist(),
+        }
         return LoopModel.from_mapping(
             {
                 "loop": name,
                 "sample_time": self.sample_time,
-                "valves": valves,
-                "process": _process_mapping(self),
+                "valves": [{"name": valve, "effects": []} | ends for valve in self.valves],
+                "process": process,
                 "operating_point": {
-                    "op": dict(zip(self.valves, model.stem0.tolist(), strict=True)),
-                    "pv": dict(zip(self.outputs, model.pv0.tolist(), strict=True)),
+                    "op": dict(zip(self.valves, self.stem0.tolist(), strict=True)),
+                    "pv": dict(zip(self.outputs, self.pv0.tolist(), strict=True)),
                 },
-                "provenance": [_provenance(self)],
+                "provenance": [provenance],
             },
             name,
         )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``fit-linear --json`` but for ``record``."""
-        outputs = []
-        for i, tag in enumerate(self.outputs):
-            entry: dict[str, Any] = {
-                "name": tag,
-                "delay": dict(zip(self.valves, self.delay[i].tolist(), strict=True)),
-                "gain": dict(zip(self.valves, self.gain[i].tolist(), strict=True)),
-                "noise_std": float(self.noise_std[i]),
-                "fit_one_step": float(self.fit_one_step[i]),
-                "fit_free_run": float(self.fit_free_run[i]),
-            }
-            if not isinstance(self.detail, StateSpaceFit):
-                entry |= _equation_json(self.detail[i], self.valves)
-            outputs.append(entry)
+        gain = self.gain
         return {
             "samples": self.samples,
             "sample_time": self.sample_time,
             "seconds": self.seconds,
             "model": {
-                "kind": self.kind.value,
+                "kind": "state_space",
                 "status": self.status.value,
                 "reason": self.reason,
                 "notes": list(self.notes),
                 "poles": [[float(pole.real), float(pole.imag)] for pole in self.poles],
-            }
-            | (_matrices_json(self.detail) if isinstance(self.detail, StateSpaceFit) else {}),
-            "outputs": outputs,
+                "method": self.method.value,
+                "order": self.order,
+                **{key: getattr(self, key).tolist() for key in ("a", "b", "c", "k", "x0")},
+                "op0": self.stem0.tolist(),
+                "pv0": self.pv0.tolist(),
+                "singular_values": self.singular_values.tolist(),
+                "rivals": [rival.to_dict() for rival in self.rivals],
+            },
+            "outputs": [
+                {
+                    "name": tag,
+                    "delay": dict(zip(self.valves, self.delay[i].tolist(), strict=True)),
+                    "gain": dict(zip(self.valves, gain[i].tolist(), strict=True)),
+                    "noise_std": float(self.noise_std[i]),
+                    "fit_one_step": float(self.fit_one_step[i]),
+                    "fit_free_run": float(self.fit_free_run[i]),
+                }
+                for i, tag in enumerate(self.outputs)
+            ],
         }
 
 
-def state_space_result(data: LinearData, fit: StateSpaceFit) -> LinearIdentification:
-    """Return the common face of a state-space model."""
-    process = None
-    if fit.order:
-        noise = tuple(Noise(float(std)) for std in fit.noise_std)
-        process = StateSpaceProcess(fit.linear_model(), data.valves, data.outputs, noise)
+def in_engineering_units(
+    data: LinearData, found: OrderChoice, method: SubspaceMethod
+) -> LinearIdentification:
+    """Return the order taken in the units of the record; arrays are not to be written to."""
+    model = found.taken.model
+    arrays = {
+        "a": model.a,
+        "b": model.b / data.u_scale,
+        "c": model.c * data.y_scale[:, None],
+        "k": model.k / data.y_scale,
+        "x0": model.x0,
+        "stem0": data.u_mean,
+        "pv0": data.y_mean + data.y_scale * model.y0,
+        "noise_std": found.taken.noise_std * data.y_scale,
+        "fit_one_step": found.taken.fit_one_step,
+        "fit_free_run": found.taken.fit_free_run,
+        "singular_values": found.singular_values,
+    }
+    kept: dict[str, Any] = {key: np.array(values) for key, values in arrays.items()}
+    for values in kept.values():
+        values.flags.writeable = False
     return LinearIdentification(
-        kind=LinearKind.STATE_SPACE,
-        status=fit.status,
-        reason=fit.reason,
+        status=found.status,
+        reason=found.reason,
         record=data.name,
         samples=data.samples,
         sample_time=data.sample_time,
         valves=data.valves,
         outputs=data.outputs,
-        delay=np.tile(np.array(fit.delay, dtype=np.int64), (len(data.outputs), 1)),
-        gain=fit.gain,
-        poles=fit.poles,
-        noise_std=fit.noise_std,
-        fit_one_step=fit.fit_one_step,
-        fit_free_run=fit.fit_free_run,
-        process=process,
-        detail=fit,
+        method=method,
+        delay=np.tile(np.array(found.delay, dtype=np.int64), (len(data.outputs), 1)),
+        rivals=found.rivals,
+        **kept,
     )
-
-
-def arx_result(data: LinearData, choices: tuple[OrderChoice, ...]) -> LinearIdentification:
-    """Return the common face of one ARX equation per output."""
-    fits = [choice.fit for choice in choices]
-    doubtful = [fit for fit in fits if fit.status is not LinearStatus.OK]
-    equations = tuple(fit.equation(data.valves) for fit in fits)
-    return LinearIdentification(
-        kind=LinearKind.ARX,
-        status=doubtful[0].status if doubtful else LinearStatus.OK,
-        reason="; ".join(f"{fit.name}: {fit.reason}" for fit in doubtful),
-        record=data.name,
-        samples=data.samples,
-        sample_time=data.sample_time,
-        valves=data.valves,
-        outputs=data.outputs,
-        delay=np.array([fit.delays for fit in fits], dtype=np.int64),
-        gain=np.stack([fit.gain for fit in fits]),
-        poles=np.concatenate([fit.poles for fit in fits]),
-        noise_std=np.array([fit.noise_std for fit in fits]),
-        fit_one_step=np.array([fit.fit_one_step for fit in fits]),
-        fit_free_run=np.array([fit.fit_free_run for fit in fits]),
-        process=ArxProcess(equations, data.valves, data.u_mean, data.y_mean),
-        detail=choices,
-    )
-
-
-def _process_mapping(found: LinearIdentification) -> dict[str, Any]:
-    """Return the ``process`` section of a loop model."""
-    process = found.process
-    if isinstance(process, ArxProcess):
-        return {"kind": "arx", "outputs": [each.to_mapping() for each in process.equations]}
-    model = found.linear_model
-    return {
-        "kind": "state_space",
-        "a": model.a.tolist(),
-        "b": model.b.tolist(),
-        "c": model.c.tolist(),
-        "outputs": [
-            {"name": tag, "noise": {"std": float(std), "enters": "measurement"}}
-            for tag, std in zip(found.outputs, found.noise_std, strict=True)
-        ],
-    }
-
-
-def _provenance(found: LinearIdentification) -> dict[str, Any]:
-    """Return where the process came from, with what a process section cannot hold."""
-    entry: dict[str, Any] = {
-        "what": "process",
-        "kind": found.kind.value,
-        "record": found.record,
-        "samples": found.samples,
-        "status": found.status.value,
-        "fit_one_step": dict(zip(found.outputs, found.fit_one_step.tolist(), strict=True)),
-        "fit_free_run": dict(zip(found.outputs, found.fit_free_run.tolist(), strict=True)),
-    }
-    if isinstance(found.detail, StateSpaceFit):
-        fit = found.detail
-        entry |= {"method": fit.method.value, "order": fit.order, "kalman_gain": fit.k.tolist()}
-    return entry
-
-
-def _matrices_json(fit: StateSpaceFit) -> dict[str, Any]:
-    return {
-        "method": fit.method.value,
-        "order": fit.order,
-        "a": fit.a.tolist(),
-        "b": fit.b.tolist(),
-        "c": fit.c.tolist(),
-        "k": fit.k.tolist(),
-        "x0": fit.x0.tolist(),
-        "op0": fit.stem0.tolist(),
-        "pv0": fit.pv0.tolist(),
-        "singular_values": fit.singular_values.tolist(),
-        "rivals": [dataclasses.asdict(row) for row in fit.rivals],
-    }
-
-
-def _equation_json(choice: OrderChoice, valves: tuple[str, ...]) -> dict[str, Any]:
-    """Return the equation in absolute units, as ``identify --json`` gives it, and its rivals."""
-    fit = choice.fit
-    bias = fit.constant + (1.0 + fit.a.sum()) * fit.pv0 - fit.b.sum(axis=1) @ fit.stem0
-    return {
-        "a": fit.a.tolist(),
-        "b": dict(zip(valves, fit.b.tolist(), strict=True)),
-        "bias": float(bias),
-        "status": fit.status.value,
-        "criterion": f"{choice.criterion} of the free run",
-        "rivals": [
-            {
-                "na": rival.orders.output,
-                "nb": rival.orders.input,
-                "delays": list(rival.delays),
-                "status": rival.status.value,
-                "aic": rival.aic,
-                "bic": rival.bic,
-                "fit_one_step": rival.fit_one_step,
-                "fit_free_run": rival.fit_free_run,
-                "chosen": rival is fit,
-            }
-            for rival in choice.rivals
-        ],
-    }

@@ -1,4 +1,4 @@
-"""One face for ARX and state space; the experiment of Appendix A."""
+"""The linear model of a record; the experiment of Appendix A."""
 
 import functools
 import json
@@ -10,18 +10,10 @@ import simulated_loops as loops
 
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
-from stiction_ros.identification.linear.data import (
-    LinearKind,
-    LinearStatus,
-    information,
-    nrmse_fit,
-    prepare_linear,
-)
+from stiction_ros.identification.linear.data import LinearStatus, nrmse_fit, prepare_linear
 from stiction_ros.identification.linear.fit import LinearOptions, fit_linear
 from stiction_ros.identification.linear.result import LinearIdentification
-from stiction_ros.identification.linear.subspace import SubspaceOptions, fit_state_space
 from stiction_ros.loop import LoopModel, prbs_experiment
-from stiction_ros.processes import ArxProcess, StateSpaceProcess
 from stiction_ros.records.record import Record
 from stiction_ros.signals.subspace_projection import SubspaceMethod
 from stiction_ros.signals.velocity_form import explained
@@ -29,16 +21,12 @@ from stiction_ros.signals.velocity_form import explained
 TANK = LoopModel.load(find_config("tank.loop.yaml")).with_ideal_valves()
 LINEAR_TANK = LoopModel.load(find_config("tank_linear.loop.yaml"))
 PAPER_GAIN = np.array([[0.02424, -0.00054], [-0.19005, 0.29754]])
-KINDS = list(LinearKind)
 
 
 def tank_gains(model: LoopModel, samples: int, order: int, seeds: range) -> np.ndarray:
     """Return the gains of stable models, one per seed, shape (seeds, 2, 2)."""
-    options = SubspaceOptions(order=order, method=SubspaceMethod.N4SID)
-    fits = [
-        fit_state_space(prepare_linear(prbs_experiment(model, samples, seed)), options)
-        for seed in seeds
-    ]
+    options = LinearOptions(order=order, method=SubspaceMethod.N4SID)
+    fits = [fit_linear(prbs_experiment(model, samples, seed), options) for seed in seeds]
     assert {fit.status for fit in fits} == {LinearStatus.OK}
     return np.array([fit.gain for fit in fits])
 
@@ -75,15 +63,14 @@ def open_loop(order: int, noise: float) -> tuple[Record, systems.System]:
 
 
 @functools.cache
-def fitted(kind: LinearKind) -> LinearIdentification:
+def fitted() -> LinearIdentification:
     """What is found of the second-order system."""
-    return fit_linear(open_loop(2, 0.05)[0], LinearOptions(kind=kind))
+    return fit_linear(open_loop(2, 0.05)[0])
 
 
 def simulated(found: LinearIdentification, record: Record) -> np.ndarray:
     """Return the free run of the process from rest, shape (N, p)."""
-    process = found.process
-    assert process is not None
+    process = found.loop_model("found").process
     state = process.rest(record.op[0], record.pv[0])
     none = np.zeros(0), np.zeros(len(record.outputs))
     out = np.empty_like(record.pv)
@@ -93,10 +80,9 @@ def simulated(found: LinearIdentification, record: Record) -> np.ndarray:
     return out
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_gives_gains_fits_and_a_process(kind: LinearKind) -> None:
+def test_gains_fits_and_a_process_are_given() -> None:
     record, system = open_loop(2, 0.05)
-    found = fitted(kind)
+    found = fitted()
     truth = system.c @ np.linalg.solve(np.eye(2) - system.a, system.b)
     assert found.status is LinearStatus.OK
     assert found.gain == pytest.approx(truth, abs=0.06 * np.abs(truth).max())
@@ -108,23 +94,19 @@ def test_every_kind_gives_gains_fits_and_a_process(kind: LinearKind) -> None:
         assert seen == pytest.approx(found.fit_free_run[i], abs=1.0)
 
 
-@pytest.mark.trial
-@pytest.mark.parametrize("kind", KINDS)
-def test_loop_model_is_the_process_that_was_found(kind: LinearKind) -> None:
+def test_loop_model_is_the_process_that_was_found() -> None:
     record, _ = open_loop(2, 0.05)
-    found = fit_linear(record, LinearOptions(kind=kind, delay=(0, 1)))
+    found = fit_linear(record, LinearOptions(order=2, delay=(1, 1)))
     text = found.loop_model("mine", (0.0, 100.0)).to_yaml()
     loop = LoopModel.from_yaml(text)
     assert loop.name == "mine"
     assert loop.limits.tolist() == [[0.0, 100.0]] * 2
     assert loop.outputs == record.outputs
-    wanted = StateSpaceProcess if kind is LinearKind.STATE_SPACE else ArxProcess
-    assert isinstance(loop.process, wanted)
     for key in ("a", "b", "c", "constant", "stem0", "pv0"):
         ours, read = getattr(found.linear_model, key), getattr(loop.process.linear(1.0), key)
         assert np.array_equal(ours, read)
     (entry,) = loop.provenance
-    assert (entry["record"], entry["samples"], entry["kind"]) == ("system", 1500, kind.value)
+    assert (entry["record"], entry["samples"], entry["method"]) == ("system", 1500, "cva")
     assert set(entry["fit_free_run"]) == set(record.outputs)
 
 
@@ -134,31 +116,14 @@ def test_what_the_process_cannot_hold_is_in_the_provenance() -> None:
     assert np.shape(space.loop_model("x").provenance[0]["kalman_gain"]) == (2, 2)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_json_is_json_and_holds_every_rival(kind: LinearKind) -> None:
-    found = fitted(kind)
-    document = json.loads(json.dumps(found.to_dict()))
-    assert document["model"]["kind"] == kind.value
+def test_json_is_json_and_holds_every_rival() -> None:
+    document = json.loads(json.dumps(fitted().to_dict()))
     assert [entry["name"] for entry in document["outputs"]] == list(open_loop(2, 0.05)[0].outputs)
     for entry in document["outputs"]:
         assert {"delay", "gain", "noise_std", "fit_one_step", "fit_free_run"} <= entry.keys()
-    space = kind is LinearKind.STATE_SPACE
-    tables = [document["model"]] if space else document["outputs"]
-    for table in tables:
-        assert len(table["rivals"]) > 2
-        assert {"aic", "bic", "fit_one_step", "fit_free_run"} <= table["rivals"][0].keys()
-
-
-def test_bias_of_the_json_is_in_absolute_units() -> None:
-    record, _ = open_loop(1, 0.0)
-    found = fit_linear(record, LinearOptions(kind=LinearKind.ARX, output_order=2, delay=(0, 0)))
-    entry = found.to_dict()["outputs"][0]
-    k = 700
-    y, u = record.pv[:, 0], record.op
-    right = entry["bias"] - sum(a * y[k - i - 1] for i, a in enumerate(entry["a"]))
-    for j, valve in enumerate(record.valves):
-        right += sum(b * u[k - i - 1, j] for i, b in enumerate(entry["b"][valve]))
-    assert right == pytest.approx(y[k], abs=1e-6)
+    rivals = document["model"]["rivals"]
+    assert len(rivals) > 2
+    assert {"aic", "bic", "fit_one_step", "fit_free_run"} <= rivals[0].keys()
 
 
 @pytest.mark.trial
@@ -173,7 +138,7 @@ def test_state_space_takes_the_delay_of_the_valve() -> None:
 
 def test_stems_of_the_record_beat_op() -> None:
     record = loops.example1(1, samples=1500)
-    options = LinearOptions(kind=LinearKind.ARX, output_order=2, delay=(4, 6))
+    options = LinearOptions(order=3, delay=(5, 5))
     aware, unaware = fit_linear(record, options, record.stem), fit_linear(record, options)
     assert aware.fit_free_run[0] > unaware.fit_free_run[0] + 10.0
 
@@ -196,7 +161,7 @@ def test_record_that_only_shows_its_controller_is_named(excitation: float, said:
         op[k] = op[k - 1] - 1.5 * (pv[k] - pv[k - 1] + pv[k] / 20.0) + extra[k]
         state = 0.8 * state + 0.2 * op[k]
     record = Record("PI", 1.0, ("V1",), ("PV1",), op[:, None], pv[:, None])
-    notes = fit_linear(record, LinearOptions(kind=LinearKind.ARX, output_order=1)).notes
+    notes = fit_linear(record, LinearOptions(order=1)).notes
     assert any("PI law" in note for note in notes) is said
     assert (explained(record.op[:, 0], record.pv) > 0.999) is said
 
@@ -212,8 +177,10 @@ def test_unstable_model_makes_no_loop() -> None:
         found.loop_model("x")
 
 
-@pytest.mark.parametrize("wrong", [{"output_order": 2}, {"kind": LinearKind.ARX, "order": 2}])
-def test_options_of_another_kind_are_refused(wrong: dict[str, object]) -> None:
+@pytest.mark.parametrize(
+    "wrong", [{"order": 0}, {"order": 101}, {"delay": (-1, 1)}, {"delay": (3, 1)}]
+)
+def test_options_out_of_range_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(InputError):
         LinearOptions(**wrong)  # type: ignore[arg-type]
 
@@ -239,13 +206,6 @@ def test_short_records_and_strange_stems_are_refused() -> None:
         prepare_linear(record, record.op[:10])
     with pytest.raises(InputError, match="not finite"):
         prepare_linear(record, np.full(record.op.shape, np.nan))
-
-
-def test_information_prices_coefficients() -> None:
-    aic, bic = information(0.5, 100, 3)
-    assert aic == pytest.approx(100 * np.log(0.5) + 6.0)
-    assert bic == pytest.approx(100 * np.log(0.5) + 3.0 * np.log(100))
-    assert information(np.inf, 100, 3) == (np.inf, np.inf)
 
 
 def test_fit_of_a_diverging_run_is_minus_infinity() -> None:

@@ -9,25 +9,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
-from stiction_ros.identification.linear.data import LinearStatus, OrderCriterion, prepare_linear
-from stiction_ros.identification.linear.subspace import (
-    StateSpaceFit,
-    SubspaceOptions,
-    fit_state_space,
-)
+from stiction_ros.identification.linear.data import LinearStatus, OrderCriterion
+from stiction_ros.identification.linear.fit import LinearOptions, fit_linear
+from stiction_ros.identification.linear.result import LinearIdentification
 from stiction_ros.records.record import Record
-from stiction_ros.signals.state_space_fit import realise_by_shift
-from stiction_ros.signals.subspace_projection import SubspaceMethod, state_sequence
+from stiction_ros.signals.subspace_projection import SubspaceMethod
 
-OBLIQUE = [SubspaceMethod.N4SID, SubspaceMethod.MOESP, SubspaceMethod.CVA]
+OBLIQUE = [SubspaceMethod.N4SID, SubspaceMethod.CVA]
 
 
-def markov(fit: StateSpaceFit, count: int) -> np.ndarray:
+def markov(fit: LinearIdentification, count: int) -> np.ndarray:
     return systems.System(fit.a, fit.b, fit.c).markov(count)
 
 
-def fitted(record: Record, **options: object) -> StateSpaceFit:
-    return fit_state_space(prepare_linear(record), SubspaceOptions(**options))  # type: ignore[arg-type]
+def fitted(record: Record, **options: object) -> LinearIdentification:
+    return fit_linear(record, LinearOptions(**options))  # type: ignore[arg-type]
 
 
 @settings(max_examples=15, deadline=None, derandomize=True)
@@ -85,7 +81,7 @@ def test_order_is_found(criterion: OrderCriterion) -> None:
     system = systems.random_system(random, 3, 1, 1)
     record = systems.experiment(system, random, 3000, noise=0.1)
     fit = fitted(record, criterion=criterion)
-    assert [row.order for row in fit.rivals] == list(range(1, 9))
+    assert [rival.order for rival in fit.rivals] == list(range(1, 9))
     assert fit.order == 3
 
 
@@ -137,8 +133,8 @@ def test_delays_become_states() -> None:
         np.hstack([late, record.op[:, 1:]]) - 50.0, np.zeros(2)
     )
     record = dataclasses.replace(record, pv=moved + 20.0)
-    fit = fitted(record, order=2, delay=(3, 0))
-    model = fit.linear_model()
+    fit = fitted(record, order=2, delay=(0, 4))
+    model = fit.linear_model
     found = systems.System(model.a, model.b, model.c).markov(15)
     truth = system.markov(15)
     assert model.order == 5
@@ -176,47 +172,26 @@ def test_stable_order_that_loses_to_an_unstable_one_is_doubtful() -> None:
     noise = 1e-4 * random.standard_normal((2, 1200, 1))
     record = Record("PI", 1.0, ("V1",), ("PV1",), op[:, None] + noise[0], pv[:, None] + noise[1])
     fit = fitted(record, method=SubspaceMethod.PREDICTOR)
-    unstable = [row.bic for row in fit.rivals if row.radius >= 1.0]
+    rivals = {rival.bic: rival.model.radius for rival in fit.rivals}
+    unstable = [bic for bic, radius in rivals.items() if radius >= 1.0]
     assert fit.status is LinearStatus.CONSTRAINED
     assert "unstable" in fit.reason
     assert np.abs(fit.poles).max() < 1.0
-    assert min(unstable) < min(row.bic for row in fit.rivals if row.radius < 1.0) - 20.0
+    assert min(unstable) < min(bic for bic, radius in rivals.items() if radius < 1.0) - 20.0
 
 
-@pytest.mark.parametrize("method", list(SubspaceMethod))
-def test_shifted_observability_shows_the_poles(method: SubspaceMethod) -> None:
-    random = np.random.default_rng(0)
-    system = systems.random_system(random, 2, 1, 1)
-    record = systems.experiment(system, random, 800, noise=0.05)
-    data = prepare_linear(record)
-    sequence = state_sequence(data.u, data.y, 10, 2, method)
-    model = realise_by_shift(sequence, 2, data.u, data.y)
-    found, truth = np.sort(np.linalg.eigvals(model.a).real), np.sort(np.linalg.eigvals(system.a))
-    assert found == pytest.approx(truth, abs=0.05)
-
-
-def test_more_states_than_the_record_shows_is_no_model() -> None:
+def test_more_states_than_the_record_shows_are_refused() -> None:
     random = np.random.default_rng(6)
     record = systems.experiment(systems.random_system(random, 1, 1, 1), random, 500)
-    fit = fitted(record, order=4)
-    assert fit.status is LinearStatus.NO_MODEL
-    assert "1 states" in fit.reason
+    with pytest.raises(InputError, match="shows 1 states, not 4; take a lower order"):
+        fitted(record, order=4)
 
 
-@pytest.mark.parametrize("wrong", [{"order": 0}, {"order": 101}, {"delay": (-1,)}])
-def test_options_out_of_range_are_refused(wrong: dict[str, object]) -> None:
-    with pytest.raises(InputError):
-        SubspaceOptions(**wrong)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(("options", "where"), [({"delay": (1, 1)}, "delay"), ({"order": 60}, "x")])
-def test_what_does_not_fit_the_record_is_refused(options: dict[str, object], where: str) -> None:
+def test_order_that_the_record_is_too_short_for_is_refused() -> None:
     random = np.random.default_rng(6)
     record = systems.experiment(systems.random_system(random, 1, 1, 1), random, 120)
-    record = dataclasses.replace(record, name="x")
-    with pytest.raises(InputError) as caught:
-        fitted(record, **options)
-    assert caught.value.where == where
+    with pytest.raises(InputError, match="too few for a horizon of 61"):
+        fitted(record, order=60)
 
 
 def test_results_are_read_only_and_repeatable() -> None:
