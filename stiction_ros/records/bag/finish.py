@@ -5,13 +5,14 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
+import yaml
 from mcap.writer import CompressionType, Writer
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.run_metadata import RUN, custom_data, merged
-from stiction_ros.records.storage import bag_metadata as metadata
+from stiction_ros.records.storage.bag_metadata import VERSION, BagTopic, yaml_text
 from stiction_ros.records.storage.files import METADATA, found_files
 from stiction_ros.records.storage.log_time import SIMULATED
 from stiction_ros.records.storage.mcap_scan import McapScan
@@ -40,27 +41,17 @@ class Packing:
             )
 
 
-class FileContent(NamedTuple):
-    """One storage file: its name, counts and times, and the scan of all of it."""
-
-    file: metadata.BagFile
-    scan: McapScan
-
-
 def storage_path(directory: Path, number: int = 0) -> Path:
     """Return an MCAP file of the bag ``directory``; splits are numbered from 0."""
     return directory / f"{directory.resolve().name}_{number}.mcap"
 
 
-def finish_bag(directory: str | Path, packing: Packing = Packing()) -> tuple[str, ...]:
+def finish_bag(directory: str | Path, packing: Packing = Packing()) -> None:
     """Rewrite the journals of a bag chunked and indexed and write its ``metadata.yaml``.
 
     What was received before simulated time was known (configurations, latched topics) came at wall
     time, years away; it gets the first simulated time. A journal is replaced when the new file is
     complete on the disk, so that a second kill loses nothing either.
-
-    Returns:
-        What was left out, one sentence each; empty when nothing was.
 
     Raises:
         InputError: no journal there, or a damaged one.
@@ -68,10 +59,8 @@ def finish_bag(directory: str | Path, packing: Packing = Packing()) -> tuple[str
     """
     directory = Path(directory)
     files = found_files(directory)
-    caps = log_time_caps(files)
-    contents = [rewrite(file, packing, cap=cap) for file, cap in zip(files, caps, strict=True)]
-    write_listing(directory, contents)
-    return tuple(note for content in contents for note in content.scan.notes)
+    pairs = zip(files, log_time_caps(files), strict=True)
+    write_listing(directory, [rewrite(McapScan(file, cap=cap), packing) for file, cap in pairs])
 
 
 def log_time_caps(files: Sequence[Path]) -> list[int | None]:
@@ -96,16 +85,9 @@ def _caps(files: int, number: int, first: int) -> list[int | None]:
     return [first if place <= number else None for place in range(files)]
 
 
-def rewrite(
-    path: Path, packing: Packing = Packing(), *, cap: int | None = None, salvage: bool = False
-) -> FileContent:
-    """Rewrite one file chunked and indexed, in its place.
-
-    Messages get ``cap``, the first simulated time of the bag, ns, as log time until it comes. To
-    ``salvage`` is to leave out what is damaged, with a note, instead of raising.
-    """
-    scan = McapScan(path, salvage=salvage)
-    partial = path.with_suffix(".mcap.part")
+def rewrite(scan: McapScan, packing: Packing = Packing()) -> McapScan:
+    """Rewrite a file chunked and indexed, in its place; return the scan, which is then complete."""
+    partial = scan.path.with_suffix(".mcap.part")
     try:
         with partial.open("wb") as output:
             target = Writer(
@@ -116,40 +98,42 @@ def rewrite(
                 enable_data_crcs=True,
             )
             target.start("ros2", "stiction_ros")
-            content = FileContent(_copy(scan, target, cap), scan)
+            _copy(scan, target)
             if run := merged(scan.metadata):
                 target.add_metadata(RUN, run)
             for name, mapping in scan.metadata:
                 if name not in (RUN, ROSBAG2):
                     target.add_metadata(name, mapping)
-            target.add_metadata(ROSBAG2, metadata.metadata_record(_information([content])))
+            target.add_metadata(ROSBAG2, metadata_record(scan))
             target.finish()  # type: ignore[no-untyped-call]
             output.flush()
             os.fsync(output.fileno())
-        os.replace(partial, path)
+        os.replace(partial, scan.path)
     finally:
         partial.unlink(missing_ok=True)
-    return content
+    return scan
 
 
-def write_listing(directory: Path, contents: Sequence[FileContent]) -> None:
+def write_listing(directory: Path, scans: Sequence[McapScan]) -> None:
     """Write ``metadata.yaml`` for the files of a bag, one at least, in their order."""
-    text = metadata.yaml_text({"rosbag2_bagfile_information": _information(contents)})
     partial = directory / f"{METADATA}.part"
     with partial.open("w", encoding="utf-8") as stream:
-        stream.write(text)
+        stream.write(yaml_text({"rosbag2_bagfile_information": _information(*scans)}))
         stream.flush()
         os.fsync(stream.fileno())
     os.replace(partial, directory / METADATA)  # a reader sees the old one or the new one
 
 
-def _copy(scan: McapScan, target: Writer, cap: int | None) -> metadata.BagFile:
-    """Copy all messages and topics; return what was written."""
+def metadata_record(scan: McapScan) -> dict[str, str]:
+    """Return the content of the MCAP metadata record ``rosbag2`` of one file."""
+    return {"serialized_metadata": yaml_text(_information(scan))}
+
+
+def _copy(scan: McapScan, target: Writer) -> None:
+    """Copy all messages and topics."""
     schemas: dict[tuple[str, str, str], int] = {}
-    channels: dict[metadata.BagTopic, int] = {}
-    counts: Counter[str] = Counter()
-    first: int | None = None
-    last: int | None = None
+    channels: dict[BagTopic, int] = {}
+    sequence: Counter[str] = Counter()
 
     def announce() -> None:
         for topic in scan.topics.values():
@@ -161,31 +145,55 @@ def _copy(scan: McapScan, target: Writer, cap: int | None) -> metadata.BagFile:
             channels[topic] = target.register_channel(
                 topic.name, topic.encoding, schemas[key], topic.channel_metadata()
             )
-            counts[topic.name] += 0
 
     for topic, log_time, publish_time, data in scan.messages():
         if len(channels) < len(scan.topics):
             announce()
-        if cap is not None:
-            if log_time <= cap:
-                cap = None
-            else:
-                log_time = cap
-        sequence = counts[topic.name] & 0xFFFFFFFF
-        target.add_message(channels[topic], log_time, data, publish_time, sequence)
-        counts[topic.name] += 1
-        first = log_time if first is None else min(first, log_time)
-        last = log_time if last is None else max(last, log_time)
+        number = sequence[topic.name] & 0xFFFFFFFF
+        target.add_message(channels[topic], log_time, data, publish_time, number)
+        sequence[topic.name] += 1
     announce()
-    return metadata.BagFile(scan.path.name, counts, first, last)
 
 
-def _information(contents: Sequence[FileContent]) -> dict[str, object]:
-    topics: dict[str, metadata.BagTopic] = {}
-    run: dict[str, str] = {}
-    for _, scan in contents:
-        run.update(merged(scan.metadata))
-        for topic in scan.topics.values():
-            topics.setdefault(topic.name, topic)
-    files = [content.file for content in contents]
-    return metadata.bag_information(files, list(topics.values()), custom=custom_data(run))
+def _information(*scans: McapScan) -> dict[str, Any]:
+    """Return the mapping ``rosbag2_bagfile_information`` of files in their order."""
+    topics: dict[str, BagTopic] = {}
+    for scan in scans:
+        topics |= {topic.name: topics.get(topic.name, topic) for topic in scan.topics.values()}
+    counts = sum((scan.counts for scan in scans), Counter[str]())
+    run = custom_data(merged(entry for scan in scans for entry in scan.metadata))
+    return {
+        "version": VERSION,
+        "storage_identifier": "mcap",
+        **_span(*scans),
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": topic.name,
+                    "type": topic.type,
+                    "serialization_format": topic.encoding,
+                    "offered_qos_profiles": yaml.safe_load(topic.qos_yaml) or [],
+                    "type_description_hash": topic.type_hash,
+                },
+                "message_count": counts[topic.name],
+            }
+            for topic in topics.values()
+        ],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [scan.path.name for scan in scans],
+        "files": [{"path": scan.path.name, **_span(scan)} for scan in scans],
+        "custom_data": run or None,
+        "ros_distro": "jazzy",
+    }
+
+
+def _span(*scans: McapScan) -> dict[str, Any]:
+    """Return starting time, duration and count of files as ``metadata.yaml`` has them."""
+    first = min(scan.first for scan in scans)
+    last = max(first, *(scan.last for scan in scans))
+    return {
+        "duration": {"nanoseconds": last - first},
+        "starting_time": {"nanoseconds_since_epoch": first},
+        "message_count": sum(scan.counts.total() for scan in scans),
+    }

@@ -4,12 +4,13 @@ import dataclasses
 import enum
 import shlex
 import shutil
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag import finish
-from stiction_ros.records.storage.bag_metadata import BagFile, joined
-from stiction_ros.records.storage.files import METADATA, found_files, listing_notes, refuse_foreign
+from stiction_ros.records.storage.files import METADATA, Listing, found_files, listing_notes
 from stiction_ros.records.storage.mcap_scan import McapScan
 from stiction_ros.records.storage.packed import SUFFIXES
 
@@ -48,51 +49,52 @@ def repair_bag(path: str | Path) -> Repair:
     if not path.exists():
         raise InputError("no such bag", where=str(path), fix="check the path")
     if path.is_dir():
-        refuse_foreign(path)
+        _refuse_foreign(path)
     elif path.suffix in SUFFIXES:
         fix = f"unpack it with `zstd -d {shlex.quote(str(path))}` and repair what comes of it"
         raise InputError("is packed", where=str(path), fix=fix)
     files = found_files(path) if path.is_dir() else (path,)
-    contents = [_look(file) for file in files]
-    scans = [content.scan for content in contents]
+    scans = [McapScan(file, salvage=True).read() for file in files]
     notes = [note for scan in scans for note in scan.notes]
-    ill = [scan.damaged or not scan.finished for scan in scans]
-    caps = finish.log_time_caps(files) if any(ill) else [None] * len(files)
-    for number, file in enumerate(files):
+    damaged = any(scan.damaged for scan in scans)
+    ill = [number for number, scan in enumerate(scans) if scan.damaged or not scan.finished]
+    caps = finish.log_time_caps(files) if ill else []
+    for number in ill:
+        file = files[number]
         if scans[number].damaged:
             shutil.copy2(file, file.with_suffix(".mcap.damaged"))
-        if ill[number]:
-            contents[number] = finish.rewrite(file, cap=caps[number], salvage=True)
-    listing = _listing_faults(path, contents)
-    if path.is_dir() and (any(ill) or listing):
-        finish.write_listing(path, contents)
-    status = RepairStatus.FINISHED if any(ill) or listing else RepairStatus.WHOLE
-    if any(scan.damaged for scan in scans):
+        scans[number] = finish.rewrite(McapScan(file, salvage=True, cap=caps[number]))
+    counts: Counter[str] = Counter()
+    for scan in scans:
+        counts.update(scan.counts)
+    listing = _listing_faults(path, counts)
+    if path.is_dir() and (ill or listing):
+        finish.write_listing(path, scans)
+    status = RepairStatus.FINISHED if ill or listing else RepairStatus.WHOLE
+    if damaged:
         status = RepairStatus.SALVAGED
-    whole = joined([content.file for content in contents])
-    names = tuple(file.name for file in files)
-    return Repair(status, names, dict(whole.counts), (*notes, *listing))
+    return Repair(status, tuple(file.name for file in files), dict(counts), (*notes, *listing))
 
 
-def _look(path: Path) -> finish.FileContent:
-    """Return what a file holds, damaged or not."""
-    scan = McapScan(path, salvage=True)
-    first: int | None = None
-    last: int | None = None
-    for message in scan.messages():
-        time = message.log_time
-        first = time if first is None else min(first, time)
-        last = time if last is None else max(last, time)
-    return finish.FileContent(BagFile(path.name, scan.counts, first, last), scan)
+def _refuse_foreign(directory: Path) -> None:
+    """Raise InputError when a readable ``metadata.yaml`` tells of a bag of another kind."""
+    try:
+        listing = Listing(directory)
+    except InputError:
+        return  # it tells nothing
+    listing.refuse_foreign()
+    if listing.compression_mode.lower() == "file":
+        fix = "unpack them with `zstd -d`, then repair each unpacked file"
+        raise InputError("its files are packed", where=str(directory), fix=fix)
 
 
-def _listing_faults(path: Path, contents: list[finish.FileContent]) -> list[str]:
+def _listing_faults(path: Path, counts: Mapping[str, int]) -> list[str]:
     """Return what is wrong with ``metadata.yaml``; nothing for a single file."""
     if not path.is_dir():
         return []
     if not (path / METADATA).is_file():
         return [f"{METADATA} is missing"]
     try:
-        return listing_notes(path, joined([content.file for content in contents]).counts)
+        return listing_notes(path, counts)
     except InputError as error:
         return [str(error)]

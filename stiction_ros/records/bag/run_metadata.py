@@ -24,18 +24,14 @@ def merged(records: Iterable[tuple[str, Mapping[str, str]]]) -> dict[str, str]:
     return run
 
 
-def may_tell(topic: str, type_name: str) -> bool:
-    """Tell whether messages of a topic are a configuration or a loop model."""
-    name = topic.rpartition("/")[2]
-    return type_name == "std_msgs/msg/String" and name in ("config", "loop_model")
-
-
 def news(topic: str, type_name: str, data: bytes) -> dict[str, str]:
     """Return what a serialised message tells of the run, a configuration or model, else empty."""
-    text = string_of(data) if may_tell(topic, type_name) else None
+    node, _, name = topic.rpartition("/")
+    if type_name != "std_msgs/msg/String" or name not in ("config", "loop_model"):
+        return {}
+    text = string_of(data)
     if text is None:
         return {}
-    node, _, name = topic.rpartition("/")
     if name == "loop_model":
         return {f"loop_model:{topic}": text}
     told = mapping_of(text)

@@ -7,28 +7,25 @@ import dataclasses
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Protocol
 
 from mcap.data_stream import RecordBuilder
-from mcap.records import Channel, Header, Message, Metadata, Schema
+from mcap.records import Channel, Header, McapRecord, Message, Metadata, Schema
 
 from stiction_ros import __version__
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.finish import ROSBAG2, Packing, finish_bag, storage_path
-from stiction_ros.records.bag.run_metadata import RUN, may_tell, news
-from stiction_ros.records.storage import bag_metadata
-from stiction_ros.records.storage.bag_metadata import Qos
-from stiction_ros.records.storage.mcap_scan import MAGIC
+from stiction_ros.records.bag.finish import (
+    ROSBAG2,
+    Packing,
+    finish_bag,
+    metadata_record,
+    storage_path,
+)
+from stiction_ros.records.bag.run_metadata import RUN, news
+from stiction_ros.records.storage.bag_metadata import BagTopic, Qos, qos_yaml
+from stiction_ros.records.storage.mcap_scan import MAGIC, McapScan
 
 __all__ = ["BagWriter", "Packing", "Qos", "Splitting"]
 _BLOCK = 1 << 20
-
-
-class Writable(Protocol):
-    """A record of the package ``mcap``."""
-
-    def write(self, stream: RecordBuilder, /) -> None:
-        """Append the record to ``stream``."""
 
 
 class Journal:
@@ -81,7 +78,7 @@ class Journal:
         self._file.close()
         self.path.unlink(missing_ok=True)
 
-    def put(self, entry: Writable) -> None:
+    def put(self, entry: McapRecord) -> None:
         """Append a record."""
         builder = RecordBuilder()
         entry.write(builder)
@@ -112,18 +109,6 @@ class Splitting:
     duration: int = 0  # log time in one file, ns
 
 
-class _Entry:
-    """What :meth:`BagWriter.write` needs of a topic."""
-
-    __slots__ = ("channel", "count", "tells", "topic")
-
-    def __init__(self, channel: int, topic: bag_metadata.BagTopic) -> None:
-        self.channel = channel
-        self.topic = topic
-        self.count = 0
-        self.tells = may_tell(topic.name, topic.type)
-
-
 class BagWriter:
     """A rosbag2 bag (MCAP storage) being written; also a context manager.
 
@@ -131,6 +116,9 @@ class BagWriter:
     returns. One thread writes. Times are integers in ns. What ``~/config`` and
     ``loop_model`` say is kept as metadata of the run too. The directory is made with parents and
     must not hold anything yet.
+
+    Attributes:
+        counts: messages written so far, by topic.
     """
 
     def __init__(
@@ -143,7 +131,9 @@ class BagWriter:
         self._packing = packing
         self._splitting = splitting
         self._limited = splitting.size > 0 or splitting.duration > 0
-        self._entries: dict[str, _Entry] = {}
+        self._topics: dict[str, BagTopic] = {}
+        self._channels: dict[str, int] = {}
+        self.counts: dict[str, int] = {}
         self._schemas: dict[tuple[str, str], int] = {}
         self._run = {"recorder": f"stiction_ros {__version__}"}
         self._number = 0
@@ -153,11 +143,6 @@ class BagWriter:
         _make_empty(self.directory)
         self._journal: Journal
         self._begin_file(0)
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Messages written so far, by topic."""
-        return {name: entry.count for name, entry in self._entries.items()}
 
     def add_topic(
         self,
@@ -174,20 +159,16 @@ class BagWriter:
         """
         self._open()
         profiles = (qos,) if isinstance(qos, Qos) else tuple(qos)
-        topic = bag_metadata.BagTopic(
-            name, type, definition_text, type_hash, bag_metadata.qos_yaml(profiles)
-        )
-        if name in self._entries:
-            known = self._entries[name].topic
-            if known.type == type:
-                return
+        topic = BagTopic(name, type, definition_text, type_hash, qos_yaml(profiles))
+        known = self._topics.get(name, topic)
+        if known.type != type:
             raise InputError(
                 f"topic {name} is recorded as {known.type} and cannot also be {type}",
                 where=str(self.directory),
             )
-        entry = _Entry(len(self._entries) + 1, topic)
-        self._announce(entry)
-        self._entries[name] = entry
+        if name not in self._topics:
+            self._announce(topic, len(self._topics) + 1)
+            self._topics[name], self.counts[name] = topic, 0
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
         """Write one serialised message (CDR) of a topic; it is safe from a kill when this returns.
@@ -195,17 +176,15 @@ class BagWriter:
         Log time, when it was received, is simulated when there is a clock; ``publish_time`` is when
         it was sent, ns. Where the storage refuses, as a full disk does, it is an OSError.
         """
-        try:
-            entry = self._entries[topic]
-        except KeyError:
-            raise InputError(f"topic {topic} was not added", where=str(self.directory)) from None
+        if topic not in self._topics:
+            raise InputError(f"topic {topic} was not added", where=str(self.directory))
         if self._limited and self._is_full(log_time):
             self._go_on()
-        sequence = entry.count & 0xFFFFFFFF
-        self._journal.put(Message(entry.channel, log_time, data, publish_time, sequence))
-        entry.count += 1
-        if entry.tells:
-            self._learn(news(topic, entry.topic.type, data))
+        sequence = self.counts[topic] & 0xFFFFFFFF
+        channel = self._channels[topic]
+        self._journal.put(Message(channel, log_time, data, publish_time, sequence))
+        self.counts[topic] += 1
+        self._learn(news(topic, self._topics[topic].type, data))
 
     def add_metadata(self, name: str, mapping: Mapping[str, str]) -> None:
         """Add a metadata record; those of the run the writer keeps by itself."""
@@ -276,24 +255,22 @@ class BagWriter:
         self._journal = Journal(path)
         self._first = None
         self._schemas = {}
-        start = bag_metadata.bag_information([bag_metadata.BagFile(path.name, {}, None, None)], [])
-        self._journal.put(Metadata(metadata=bag_metadata.metadata_record(start), name=ROSBAG2))
+        self._journal.put(Metadata(metadata=metadata_record(McapScan(path)), name=ROSBAG2))
         self._journal.put(Metadata(metadata=self._run, name=RUN))
-        for entry in self._entries.values():
-            self._announce(entry)
+        for channel, topic in enumerate(self._topics.values(), start=1):
+            self._announce(topic, channel)
         self._number = number
 
-    def _announce(self, entry: _Entry) -> None:
+    def _announce(self, topic: BagTopic, channel: int) -> None:
         """Write the channel of a topic, and its schema when the file has not got it yet."""
-        topic = entry.topic
         key = (topic.type, topic.definition)
         if key not in self._schemas:
             number = len(self._schemas) + 1
             self._journal.put(Schema(number, topic.definition.encode(), "ros2msg", topic.type))
             self._schemas[key] = number
         metadata = topic.channel_metadata()
-        schema = self._schemas[key]
-        self._journal.put(Channel(entry.channel, topic.name, "cdr", metadata, schema))
+        self._journal.put(Channel(channel, topic.name, "cdr", metadata, self._schemas[key]))
+        self._channels[topic.name] = channel
 
     def _learn(self, told: Mapping[str, str]) -> None:
         changed = {key: text for key, text in told.items() if self._run.get(key) != text}

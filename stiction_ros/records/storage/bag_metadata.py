@@ -1,8 +1,7 @@
-"""What a bag says of its topics and of itself: QoS, topics, ``metadata.yaml``."""
+"""What a bag says of its topics: QoS, types and definitions."""
 
 import dataclasses
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import yaml
@@ -77,73 +76,6 @@ class BagTopic:
 def qos_yaml(profiles: Sequence[Qos]) -> str:
     """Return the YAML list of ``profiles`` that goes into the channel metadata."""
     return yaml_text([profile.mapping() for profile in profiles]).strip() if profiles else ""
-
-
-@dataclasses.dataclass(frozen=True)
-class BagFile:
-    """One storage file of a bag: its name and what is in it (times in ns)."""
-
-    name: str
-    counts: Mapping[str, int]
-    first: int | None
-    last: int | None
-
-    @property
-    def span(self) -> dict[str, Any]:
-        """Return starting time, duration and count as ``metadata.yaml`` has them."""
-        first = INFINITE_NS if self.first is None else self.first
-        last = first if self.last is None else self.last
-        return {
-            "duration": {"nanoseconds": last - first},
-            "starting_time": {"nanoseconds_since_epoch": first},
-            "message_count": sum(self.counts.values()),
-        }
-
-
-def joined(files: Sequence[BagFile]) -> BagFile:
-    """Return what is in all files together, under the name of the first."""
-    counts: Counter[str] = Counter()
-    for file in files:
-        counts.update(file.counts)
-    first = min((file.first for file in files if file.first is not None), default=None)
-    last = max((file.last for file in files if file.last is not None), default=None)
-    return BagFile(files[0].name, dict(counts), first, last)
-
-
-def bag_information(
-    files: Sequence[BagFile], topics: Sequence[BagTopic], *, custom: Mapping[str, str] | None = None
-) -> dict[str, Any]:
-    """Return the mapping ``rosbag2_bagfile_information`` of a bag of ``files`` in their order."""
-    whole = joined(files)
-    return {
-        "version": VERSION,
-        "storage_identifier": "mcap",
-        **whole.span,
-        "topics_with_message_count": [
-            {
-                "topic_metadata": {
-                    "name": topic.name,
-                    "type": topic.type,
-                    "serialization_format": topic.encoding,
-                    "offered_qos_profiles": yaml.safe_load(topic.qos_yaml) or [],
-                    "type_description_hash": topic.type_hash,
-                },
-                "message_count": whole.counts.get(topic.name, 0),
-            }
-            for topic in topics
-        ],
-        "compression_format": "",
-        "compression_mode": "",
-        "relative_file_paths": [file.name for file in files],
-        "files": [{"path": file.name, **file.span} for file in files],
-        "custom_data": dict(custom) if custom else None,
-        "ros_distro": "jazzy",
-    }
-
-
-def metadata_record(information: Mapping[str, Any]) -> dict[str, str]:
-    """Return the content of the MCAP metadata record ``rosbag2``."""
-    return {"serialized_metadata": yaml_text(information)}
 
 
 def yaml_text(value: Any) -> str:

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import zstandard
 from mcap import records as mcap_records
@@ -20,7 +20,7 @@ from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from stiction_ros.errors import InputError, storing
-from stiction_ros.records.storage.bag_metadata import BagTopic
+from stiction_ros.records.storage.bag_metadata import INFINITE_NS, BagTopic
 from stiction_ros.records.storage.packed import SQLITE, conversion, opened
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -36,6 +36,14 @@ _DAMAGE: tuple[type[Exception], ...] = (
 """What damaged bytes raise in the readers of records and in the decompressors."""
 
 
+_KINDS: dict[int, Any] = {
+    Opcode.SCHEMA: mcap_records.Schema,
+    Opcode.CHANNEL: mcap_records.Channel,
+    Opcode.METADATA: mcap_records.Metadata,
+}
+"""Other records that are read, by their opcode."""
+
+
 class RawMessage(NamedTuple):
     """One message as bytes: its topic, log and publish time in ns, serialised data."""
 
@@ -48,9 +56,13 @@ class RawMessage(NamedTuple):
 class McapScan:
     """One pass over an MCAP file; to ``salvage`` is to pass over damaged records with a note.
 
+    Messages get ``cap``, the first simulated time of the bag, ns, as log time until it comes.
+
     Attributes:
         topics: channel id to topic, filled as :meth:`messages` goes on.
         counts: messages by topic name, as far as :meth:`messages` has come.
+        first: least log time met so far, ns; the infinite one while there is no message.
+        last: largest log time met so far, ns.
         metadata: name and content of every metadata record met so far.
         chunked: whether a chunk was met.
         finished: whether it ends as a finished file does; False for a file whose writer
@@ -59,15 +71,22 @@ class McapScan:
         damaged: whether there is a note on damage of the data, which only a salvage survives.
     """
 
-    def __init__(self, path: Path, *, salvage: bool = False) -> None:
+    def __init__(self, path: Path, *, salvage: bool = False, cap: int | None = None) -> None:
         self.path = path
         self.topics: dict[int, BagTopic] = {}
         self.counts: Counter[str] = Counter()
+        self.first, self.last = INFINITE_NS, 0
         self.metadata: list[tuple[str, dict[str, str]]] = []
         self.chunked = self.finished = self.damaged = False
         self.notes: list[str] = []
-        self._salvage = salvage
+        self._salvage, self._cap = salvage, cap
         self._schemas: dict[int, mcap_records.Schema] = {}
+
+    def read(self) -> "McapScan":
+        """Go through the whole file and return the scan."""
+        for _ in self.messages():
+            pass
+        return self
 
     def messages(self) -> Iterator[RawMessage]:
         """Yield every complete message in the order of the file, those before a damage first.
@@ -122,14 +141,8 @@ class McapScan:
         if opcode == Opcode.CHUNK:
             self.chunked = True
             return breakup_chunk(mcap_records.Chunk.read(stream), validate_crc=True)
-        for kind, number in (
-            (mcap_records.Schema, Opcode.SCHEMA),
-            (mcap_records.Channel, Opcode.CHANNEL),
-            (mcap_records.Metadata, Opcode.METADATA),
-        ):
-            if opcode == number:
-                return [kind.read(stream)]
-        return []
+        kind = _KINDS.get(opcode)
+        return [kind.read(stream)] if kind is not None else []
 
     def _take(self, records: Iterable[mcap_records.McapRecord], found: list[RawMessage]) -> None:
         for record in records:
@@ -138,7 +151,11 @@ class McapScan:
                 if topic is None:
                     raise ValueError(f"a message of channel {record.channel_id} that is not known")
                 self.counts[topic.name] += 1
-                found.append(RawMessage(topic, record.log_time, record.publish_time, record.data))
+                time = record.log_time if self._cap is None else min(self._cap, record.log_time)
+                if time == record.log_time:
+                    self._cap = None
+                self.first, self.last = min(self.first, time), max(self.last, time)
+                found.append(RawMessage(topic, time, record.publish_time, record.data))
             elif isinstance(record, mcap_records.Metadata):
                 self.metadata.append((record.name, record.metadata))
             else:
