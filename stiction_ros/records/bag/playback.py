@@ -157,26 +157,25 @@ class Playback:
 
     def next_messages(self) -> list[RawMessage]:
         """Return every message of the next log time; a running playback gives none."""
-        found: list[RawMessage] = []
-        if not self.paused:
-            return found
-        round_before = self.rounds
-        while not self.finished and self.rounds == round_before:
-            time = self._messages[self._place].log_time
-            if found and time != found[0].log_time:
-                break
-            self._bag_time = max(self._bag_time, time)
-            found.append(self._take())
-        return found
+        if not self.paused or self.finished:
+            return []
+        time = self._messages[self._place].log_time
+        self._bag_time = max(self._bag_time, time)
+        return self._taken(lambda message: message.log_time == time)
 
     def due(self, most: int) -> list[RawMessage]:
         """Return up to ``most`` messages whose time has come, in the order of the bag."""
+        now = self.time
+        return [] if self.paused else self._taken(lambda message: message.log_time <= now, most)
+
+    def _taken(
+        self, wanted: Callable[[RawMessage], bool], most: float = float("inf")
+    ) -> list[RawMessage]:
+        """Return the next messages of this round as long as they are ``wanted``."""
         found: list[RawMessage] = []
-        if self.paused:
-            return found
-        now, round_before = self.time, self.rounds
+        round_before = self.rounds
         while not self.finished and self.rounds == round_before and len(found) < most:
-            if self._messages[self._place].log_time > now:
+            if not wanted(self._messages[self._place]):
                 break
             found.append(self._take())
         return found
