@@ -48,34 +48,28 @@ class Whole:
         if len(self.time) < 2 or (self.time[1:] <= self.time[:-1]).any():
             sample_time(self.time, source.where, source.place)  # tells which row
         stretches = [edge for edge in split_at_gaps(self.time) if edge[1] - edge[0] > 1]
-        lone = len(self.time) - sum(last - first for first, last in stretches)
-        found, left_out = [], 0
-        for first, last in stretches:
-            parts, alone = self._parts(first, last, source.cut_holes)
-            found += parts
-            left_out += alone
+        parts = [part for edge in stretches for part in self._parts(*edge, source.cut_holes)]
+        rows = sum(last - first for first, last in stretches)
         said = list(notes)
-        if lone:
-            said.append(f"{lone} rows alone between two gaps left out")
-        if left_out:
-            said.append(f"{left_out} rows alone between two holes left out")
-        if len(found) > 1:
-            said.append(f"split at {len(found) - 1} gap{'s' * (len(found) > 2)}")
-        return self._regular(found, source, said)
+        for count, between in (
+            (len(self.time) - rows, "gaps"),
+            (rows - sum(part.last - part.first for part in parts), "holes"),
+        ):
+            if count:
+                said.append(f"{count} rows alone between two {between} left out")
+        if len(parts) > 1:
+            said.append(f"split at {len(parts) - 1} gap{'s' * (len(parts) > 2)}")
+        return self._regular(parts, source, said)
 
-    def _parts(self, first: int, last: int, cut_holes: bool) -> tuple[list[Part], int]:
-        """Return the stretch as it is, or its pieces between holes, and how many rows are lost."""
+    def _parts(self, first: int, last: int, cut_holes: bool) -> list[Part]:
+        """Return the stretch as it is, or its pieces between holes."""
         part = regular_part(self.time, first, last)
-        steps = np.diff(part.time)
-        usual = float(np.median(np.diff(self.time)))
-        apart = bool((steps > HOLE * usual).any())
-        if not (cut_holes and apart):
-            return [part], 0
-        cuts = np.flatnonzero(np.diff(self.time[first:last]) > HOLE * usual) + first + 1
+        hole = HOLE * float(np.median(np.diff(self.time)))
+        if not (cut_holes and (np.diff(part.time) > hole).any()):
+            return [part]
+        cuts = np.flatnonzero(np.diff(self.time[first:last]) > hole) + first + 1
         edges = itertools.pairwise([first, *cuts.tolist(), last])
-        pieces = [(a, b) for a, b in edges if b - a > 1]
-        lost = last - first - sum(b - a for a, b in pieces)
-        return [regular_part(self.time, a, b) for a, b in pieces], lost
+        return [regular_part(self.time, a, b) for a, b in edges if b - a > 1]
 
     def _regular(
         self, parts: Sequence[Part], source: Source, notes: list[str]

@@ -205,11 +205,10 @@ def swap_of(changes: Iterable[ModeChange], before: str = "") -> ModeChange | Non
 
 def mode_texts(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
     """Return the changes on ``mode``, whose messages bear no stamp: log times stand in."""
-    changes: list[ModeChange] = []
-    for text in texts(messages, "mode"):
-        if not changes or changes[-1].mode != text.text:
-            changes.append(ModeChange(text.log_time, text.text, reason="time of reception"))
-    return tuple(changes)
+    return without_repeats(
+        ModeChange(text.log_time, text.text, reason="time of reception")
+        for text in texts(messages, "mode")
+    )
 
 
 def texts(messages: Iterable[BagMessage], name: str) -> tuple[Text, ...]:

@@ -3,17 +3,14 @@
 import dataclasses
 import itertools
 import math
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.records.bag.messages import BagMessage, MessageDecoder, read_raw
 from stiction_ros.records.parts import joined, span
 from stiction_ros.records.record import Record
 from stiction_ros.records.run import events
-from stiction_ros.records.run.loop_runs import LoopRun, bag_source, loop_runs
-from stiction_ros.records.run.loop_signals import LoopSignals, is_signal
+from stiction_ros.records.run.loop_runs import BagLoops, LoopRun
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,23 +60,7 @@ class RunLog:
         """The last fit whose window ended before the swap."""
         if self.swap is None:
             return None
-        return max(
-            (fit for fit in self.fits if fit.stamp < self.swap.stamp),
-            key=lambda fit: fit.stamp,
-            default=None,
-        )
-
-
-@dataclasses.dataclass(frozen=True)
-class _Bag:
-    """What a bag holds, of all its loops."""
-
-    path: str | Path
-    signals: LoopSignals
-    messages: Sequence[tuple[int, BagMessage]]  # the others that tell of a run, with their numbers
-    recorded: Mapping[str, int]  # messages by topic
-    sent: Sequence[int]  # when each was published, ns
-    notes: Sequence[str]  # what was left out
+        return next((f for f in reversed(self.fits) if f.stamp < self.swap.stamp), None)
 
 
 def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
@@ -88,42 +69,18 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
     Of several runs the longest is told, with a note on the others. Arguments and errors are those
     of :func:`stiction_ros.records.run.loop_runs.read_bag_parts`.
     """
-    return _log(_read(path), namespace)
+    return _log(BagLoops.read(path, events.tells_of_run), namespace)
 
 
 def read_runs(path: str | Path, namespaces: Iterable[str]) -> dict[str, RunLog]:
     """Read several loops of a bag in one pass, each as :func:`read_run`, by namespace."""
-    bag = _read(path)
+    bag = BagLoops.read(path, events.tells_of_run)
     return {namespace: _log(bag, namespace) for namespace in namespaces}
 
 
-def _read(path: str | Path) -> _Bag:
-    notes: list[str] = []
-    recorded: Counter[str] = Counter()
-    messages: list[tuple[int, BagMessage]] = []
-    signals = LoopSignals(str(path))
-    decoder = MessageDecoder()
-    sent: list[int] = []
-    for number, raw in enumerate(read_raw(path, notes)):
-        recorded[raw.topic.name] += 1
-        sent.append(raw.publish_time)
-        signal = is_signal(raw.topic)
-        if not signal and not events.tells_of_run(raw.topic):
-            continue
-        message = decoder.decode(raw, str(path))
-        if message is None:
-            continue
-        if signal:
-            signals.add(message, number)
-        else:
-            messages.append((number, message))
-    notes.extend(decoder.notes)
-    return _Bag(path, signals, messages, recorded, sent, notes)
-
-
-def _log(bag: _Bag, namespace: str | None) -> RunLog:
-    messages, signals = bag.messages, bag.signals
-    runs = loop_runs(signals, bag_source(bag.path), namespace, bag.notes)
+def _log(bag: BagLoops, namespace: str | None) -> RunLog:
+    messages, signals = bag.others, bag.signals
+    runs = bag.runs(namespace)
     run = max(runs, key=len)
     place = runs.index(run)  # what was said between the begin of the run and that of the next one
     begin = run.begin if place else 0
@@ -150,7 +107,7 @@ def _log(bag: _Bag, namespace: str | None) -> RunLog:
         notes=record.notes,
         fits=events.fits(said),
         stem_estimate=events.stem_estimate(said, record, start),
-        wall_seconds=(max(bag.sent) - min(bag.sent)) / 1e9,
+        wall_seconds=bag.wall_seconds,
         gaps=events.gap_log(said),
         pv_to_op_ms=events.answer_times(said),
     )

@@ -1,21 +1,22 @@
 """Joins the signals of a loop by stamp: runs, and records without a gap of each."""
 
 import dataclasses
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.messages import read_messages
+from stiction_ros.records.bag.messages import BagMessage, MessageDecoder, Wanted, read_raw
 from stiction_ros.records.record import Quality, Record
 from stiction_ros.records.run.bag_runs import run_of, tell_runs
 from stiction_ros.records.run.loop_signals import Given, LoopSignals, is_signal
 from stiction_ros.records.whole import Source, Whole
 
-Samples = dict[int, dict[str, float]]  # stamp in ns to tag to value
+Samples = dict[int, tuple[float, ...]]  # stamp in ns to the value of each tag
 MOST_HELD = 0.01  # share of the samples at which a missing stem is held
 
 
@@ -81,10 +82,13 @@ class _Loop:
     """The signals of one loop, by run and stamp."""
 
     def __init__(self, signals: LoopSignals, space: str, source: Source) -> None:
-        self._signals, self._space, self._source = signals, space, source
+        self._source = source
         given_op = signals.op(space)
         self.outputs, self.valves = signals.tags(space, "pv"), signals.tags(space, given_op)
-        pv = signals.given(space, "pv", self.outputs)
+        widths = {"pv": self.outputs, "sp": self.outputs, "op": self.valves}
+        widths |= {"op_applied": self.valves, "stem": self.valves}
+        given = {signal: signals.given(space, signal, tags) for signal, tags in widths.items()}
+        pv = given["pv"]
         if not pv or not self.valves:
             what = "pv" if not pv else given_op
             tags = self.outputs if not pv else self.valves
@@ -96,8 +100,6 @@ class _Loop:
         told = tell_runs([g.stamp for g in pv], [g.number for g in pv])
         self.runs = told.runs
         self._every = sorted((*told.runs, *told.strays), key=lambda run: run.begin)
-        widths = {"pv": self.outputs, "sp": self.outputs, "op": self.valves}
-        widths |= {"op_applied": self.valves, "stem": self.valves}
         skipped = [signals.skipped(space, signal, tags) for signal, tags in widths.items()]
         self.notes = [sentence for sentence in skipped if sentence]
         self._only_applied = given_op != "op"
@@ -108,12 +110,10 @@ class _Loop:
         if len(self.runs) > 1:
             self.notes.append(f"{len(self.runs)} runs are told apart: stamps fall back")
         self._pv = {g.number: g.values for g in pv}
-        self._of = {
-            signal: self._by_run(signals.given(space, signal, self.valves))
-            for signal in ("op", "op_applied", "stem")
-        }
-        self._sp = self._set_points(signals.given(space, "sp", self.outputs))
-        self._sp_lacks = bool(not self._sp and signals.tags(space, "sp"))
+        self._of = {signal: self._by_run(given[signal]) for signal in widths if signal != "pv"}
+        self._set_points(given["sp"])
+        self._sp_lacks = bool(not given["sp"] and signals.tags(space, "sp"))
+        self._has_stem = bool(signals.tags(space, "stem"))
 
     def run(self, number: int, notes: Sequence[str]) -> LoopRun:
         """Return one run; InputError for fewer than two samples, or none that are regular."""
@@ -127,14 +127,14 @@ class _Loop:
             outputs=self.outputs,
             time=(stamps - first) / 1e9,
             start=0.0,
-            op=_at(stamps, op, self.valves),
-            pv=_at(stamps, pv, self.outputs),
+            op=_at(stamps, op, len(self.valves)),
+            pv=_at(stamps, pv, len(self.outputs)),
             sp=self._held(number, stamps, said),
             stem=self._stem(number, stamps, said),
         )
         parts = whole.records(self._source, said)
         begin = first + round(parts[0].start * 1e9)
-        parts = tuple(_with_known(part, first, pv, op) for part in parts)
+        parts = tuple(_with_known(part, first, pv=pv, op=op) for part in parts)
         moved = tuple(dataclasses.replace(p, start=first / 1e9 + p.start) for p in parts)
         return LoopRun(run.begin, run.end, begin, moved)
 
@@ -154,16 +154,12 @@ class _Loop:
                 found[number][stamp], off[number][stamp] = message.values, away
         return found
 
-    def _set_points(self, given: Sequence[Given]) -> list[Samples]:
-        """Return the set-points for each run; those in force when it begins come with it."""
-        if not given:
-            return []
-        found = self._by_run(given)
-        for number, run in enumerate(self.runs[1:], start=1):
+    def _set_points(self, given: Sequence[Given]) -> None:
+        """Put the set-points in force when a run begins at its beginning."""
+        for found, run in zip(self._of["sp"][1:], self.runs[1:], strict=True):
             before = [g for g in given if g.number < run.begin]
-            if before and min(found[number], default=run.last) > run.first:
-                found[number][run.first] = before[-1].values
-        return found
+            if before and min(found, default=run.last) > run.first:
+                found[run.first] = before[-1].values
 
     def _op(self, number: int, pv: Mapping[int, Any], notes: list[str]) -> Samples:
         """Return OP by stamp: what was applied where that is known, else what was commanded."""
@@ -179,11 +175,9 @@ class _Loop:
             notes.append(f"no op at {added} samples, op_applied is taken there")
         return {**op, **applied}
 
-    def _held(
-        self, number: int, stamps: np.ndarray[Any, Any], notes: list[str]
-    ) -> FloatArray | None:
+    def _held(self, number: int, stamps: IntArray, notes: list[str]) -> FloatArray | None:
         """Return the last set-points given at or before each stamp."""
-        known = self._sp[number] if self._sp else {}
+        known = self._of["sp"][number]
         if not known or not len(stamps):
             if self._sp_lacks:
                 notes.append("sp has no value for every pv, left out")
@@ -191,14 +185,12 @@ class _Loop:
         late = int(np.count_nonzero(stamps < min(known)))
         if late:
             notes.append(f"no sp for the first {late} samples, the first one given is taken")
-        return _latest(stamps, known, self.outputs)
+        return _latest(stamps, known)
 
-    def _stem(
-        self, number: int, stamps: np.ndarray[Any, Any], notes: list[str]
-    ) -> FloatArray | None:
-        known = self._of["stem"][number]
-        if not self._signals.tags(self._space, "stem"):
+    def _stem(self, number: int, stamps: IntArray, notes: list[str]) -> FloatArray | None:
+        if not self._has_stem:
             return None
+        known = self._of["stem"][number]
         there = {stamp: known[stamp] for stamp in stamps.tolist() if stamp in known}
         missing = len(stamps) - len(there)
         said = f"stem is missing at {missing} of {len(stamps)} samples"
@@ -207,35 +199,73 @@ class _Loop:
             return None
         if missing:
             notes.append(f"{said}, the one before is held there")
-        return _latest(stamps, there, self.valves)
+        return _latest(stamps, there)
 
 
-def _at(stamps: np.ndarray[Any, Any], samples: Samples, tags: tuple[str, ...]) -> FloatArray:
-    """Return the values at ``stamps``, shape (N, len(tags))."""
-    rows = [[samples[stamp][tag] for tag in tags] for stamp in stamps.tolist()]
-    return np.array(rows, dtype=float).reshape(len(stamps), len(tags))
+def _at(stamps: IntArray, samples: Samples, width: int) -> FloatArray:
+    """Return the values at ``stamps``, shape (N, width)."""
+    return np.array([samples[k] for k in stamps.tolist()], dtype=float).reshape(-1, width)
 
 
-def _with_known(record: Record, first: int, pv: Samples, op: Samples) -> Record:
-    """Return the record with what is known, by stamp, of samples that lack PV or OP."""
-    held = np.flatnonzero(record.quality == Quality.HELD).tolist()
-    if not held:
-        return record
-    values = {"pv": record.pv.copy(), "op": record.op.copy()}
-    tags = {"pv": record.outputs, "op": record.valves}
-    for row in held:
-        stamp = first + round((record.start + row * record.sample_time) * 1e9)
-        for signal, samples in (("pv", pv), ("op", op)):
-            if stamp in samples:
-                values[signal][row] = [samples[stamp][tag] for tag in tags[signal]]
-    return dataclasses.replace(record, pv=values["pv"], op=values["op"])
-
-
-def _latest(stamps: np.ndarray[Any, Any], known: Samples, tags: tuple[str, ...]) -> FloatArray:
+def _latest(stamps: IntArray, known: Samples) -> FloatArray:
     """Return the values given last at or before each stamp; before the first, the first."""
-    given = np.array(sorted(known), dtype=np.int64)
+    given = sorted(known)
     index = np.searchsorted(given, stamps, side="right") - 1
-    return _at(given, known, tags)[np.maximum(index, 0)]
+    return np.array([known[stamp] for stamp in given])[np.maximum(index, 0)]
+
+
+def _with_known(record: Record, first: int, **known: Samples) -> Record:
+    """Return the record with what is known, by signal and stamp, of samples that lack PV or OP."""
+    held = np.flatnonzero(record.quality == Quality.HELD)
+    stamps = first + np.rint((record.start + held * record.sample_time) * 1e9).astype(np.int64)
+    changed = {signal: getattr(record, signal).copy() for signal in known}
+    for signal, samples in known.items():
+        for row, stamp in zip(held.tolist(), stamps.tolist(), strict=True):
+            if stamp in samples:
+                changed[signal][row] = samples[stamp]
+    return dataclasses.replace(record, **changed) if len(held) else record
+
+
+@dataclasses.dataclass(frozen=True)
+class BagLoops:
+    """What a bag holds, of all its loops."""
+
+    path: str | Path
+    signals: LoopSignals
+    # other messages that were wanted, with numbers between those of the signals around them
+    others: Sequence[tuple[float, BagMessage]]
+    recorded: Mapping[str, int]  # messages by topic
+    wall_seconds: float  # from first to last publication, on the publishers' clock
+    notes: Sequence[str]  # what was left out
+
+    @classmethod
+    def read(cls, path: str | Path, others: Wanted = lambda topic: False) -> "BagLoops":
+        """Read a bag in one pass."""
+        signals, count = LoopSignals(str(path)), 0
+        messages: list[tuple[float, BagMessage]] = []
+        notes: list[str] = []
+        decoder, recorded, sent = MessageDecoder(), Counter[str](), list[int]()
+        for raw in read_raw(path, notes):
+            recorded[raw.topic.name] += 1
+            sent.append(raw.publish_time)
+            signal = is_signal(raw.topic)
+            message = decoder.decode(raw, str(path)) if signal or others(raw.topic) else None
+            if message is not None and signal:
+                signals.add(message, count)
+                count += 1
+            elif message is not None:
+                messages.append((count - 0.5, message))
+        notes += decoder.notes
+        seconds = (max(sent, default=0) - min(sent, default=0)) / 1e9
+        return cls(path, signals, messages, recorded, seconds, notes)
+
+    def runs(self, namespace: str | None) -> tuple[LoopRun, ...]:
+        """Return the runs of a loop by :func:`loop_runs`."""
+        return loop_runs(self.signals, bag_source(self.path), namespace, self.notes)
+
+    def parts(self, namespace: str | None) -> tuple[Record, ...]:
+        """Return the records of a loop."""
+        return tuple(part for run in self.runs(namespace) for part in run.parts)
 
 
 def read_bag_parts(path: str | Path, *, namespace: str | None = None) -> tuple[Record, ...]:
@@ -246,19 +276,18 @@ def read_bag_parts(path: str | Path, *, namespace: str | None = None) -> tuple[R
     the loop's topics, needed when the bag holds several loops.
 
     Raises:
-        InputError: as :func:`read_messages`; no ``pv`` or ``op``; stamps that are irregular.
+        InputError: as :func:`read_raw`; no ``pv`` or ``op``; stamps that are irregular.
     """
-    return _parts(path, *_signals(path), namespace)
+    return BagLoops.read(path).parts(namespace)
 
 
 def read_bag_loops(path: str | Path) -> dict[str, tuple[Record, ...] | InputError]:
     """Return the records of every loop by its namespace, as ``/unit1``, or why there are none."""
-    signals, notes = _signals(path)
+    content = BagLoops.read(path)
     found: dict[str, tuple[Record, ...] | InputError] = {}
-    for space in signals.loops or ("",):
+    for space in content.signals.loops or ("",):
         try:
-            chosen = (space or "/") if signals.loops else None
-            found[space] = _parts(path, signals, notes, chosen)
+            found[space] = content.parts((space or "/") if content.signals.loops else None)
         except InputError as error:
             found[space] = error
     return found
@@ -269,19 +298,3 @@ def bag_source(path: str | Path) -> Source:
     return Source(
         Path(path).name, str(path), lambda row: f"sample {row} of pv and op", cut_holes=True
     )
-
-
-def _signals(path: str | Path) -> tuple[LoopSignals, list[str]]:
-    """Return the signals of all loops in a bag, and what was left out while reading."""
-    notes: list[str] = []
-    signals = LoopSignals(str(path))
-    for number, message in enumerate(read_messages(path, wanted=is_signal, notes=notes)):
-        signals.add(message, number)
-    return signals, notes
-
-
-def _parts(
-    path: str | Path, signals: LoopSignals, notes: list[str], namespace: str | None
-) -> tuple[Record, ...]:
-    runs = loop_runs(signals, bag_source(path), namespace, notes)
-    return tuple(part for run in runs for part in run.parts)

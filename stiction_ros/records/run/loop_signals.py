@@ -17,7 +17,7 @@ class Given(NamedTuple):
 
     number: int  # its place in the log
     stamp: int  # ns
-    values: dict[str, float]  # tag to value
+    values: tuple[float, ...]  # of the tags that were asked for
 
 
 def is_signal(topic: BagTopic) -> bool:
@@ -30,7 +30,8 @@ class LoopSignals:
 
     def __init__(self, where: str) -> None:
         self._where = where
-        self._given: dict[tuple[str, str], list[Given]] = {}
+        # number, stamp and value by tag of each usable message, by namespace and signal
+        self._usable: dict[tuple[str, str], list[tuple[int, int, dict[str, float]]]] = {}
         self._bad: dict[tuple[str, str], Counter[str]] = {}
 
     def add(self, message: BagMessage, number: int) -> None:
@@ -45,28 +46,30 @@ class LoopSignals:
                 where=self._where,
                 fix="record it again with the one that ROS has",
             ) from None
-        self._given.setdefault(key, [])
+        usable = self._usable.setdefault(key, [])
         if wrong:
             self._bad.setdefault(key, Counter())[wrong] += 1
-            return
-        given = Given(number, stamp, dict(zip(map(str, names), values, strict=True)))
-        self._given[key].append(given)
+        else:
+            usable.append((number, stamp, dict(zip(map(str, names), values, strict=True))))
 
     def tags(self, space: str, signal: str) -> tuple[str, ...]:
         """Return the tags that most messages of a signal bear; empty without a usable one."""
-        found = Counter(tuple(given.values) for given in self._given.get((space, signal), ()))
+        found = Counter(tuple(values) for *_, values in self._usable.get((space, signal), ()))
         return found.most_common(1)[0][0] if found else ()
 
     def given(self, space: str, signal: str, tags: tuple[str, ...]) -> list[Given]:
         """Return the messages of a signal that have a value for each of ``tags``."""
-        wanted = set(tags)
-        return [g for g in self._given.get((space, signal), ()) if g.values.keys() >= wanted]
+        return [
+            Given(number, stamp, tuple(values[tag] for tag in tags))
+            for number, stamp, values in self._usable.get((space, signal), ())
+            if values.keys() >= set(tags)
+        ]
 
     def skipped(self, space: str, signal: str, tags: tuple[str, ...]) -> str:
         """Return a sentence on the messages of a signal that are left out; empty for none."""
         key = (space, signal)
         wrong = Counter(self._bad.get(key, Counter()))
-        lacking = len(self._given.get(key, ())) - len(self.given(space, signal, tags))
+        lacking = len(self._usable.get(key, ())) - len(self.given(space, signal, tags))
         if lacking:
             wrong["without a value for every tag"] = lacking
         if not wrong:
@@ -78,13 +81,13 @@ class LoopSignals:
     @property
     def loops(self) -> tuple[str, ...]:
         """Namespaces that have ``pv`` and an OP, such as ``/unit1``, empty for ``/``."""
-        spaces = dict.fromkeys(space for space, _ in self._given)
-        ops = {s for s in spaces for op in ("op", "op_applied") if (s, op) in self._given}
-        return tuple(s for s in spaces if s in ops and (s, "pv") in self._given)
+        spaces = dict.fromkeys(space for space, _ in self._usable)
+        ops = {s for s in spaces for op in ("op", "op_applied") if (s, op) in self._usable}
+        return tuple(s for s in spaces if s in ops and (s, "pv") in self._usable)
 
     def op(self, space: str) -> str:
         """Return the signal whose tags are the valves: ``op``, else ``op_applied``."""
-        return "op" if (space, "op") in self._given else "op_applied"
+        return "op" if (space, "op") in self._usable else "op_applied"
 
     def loop(self, namespace: str | None) -> str:
         """Return the namespace of the loop that is meant; InputError for none or an open choice.
@@ -96,7 +99,7 @@ class LoopSignals:
             wanted = "/" + namespace.strip("/") if namespace.strip("/") else ""
             loops = [space for space in loops if space == wanted]
         else:
-            loops = [space for space in loops if (space, "op") in self._given] or loops
+            loops = [space for space in loops if (space, "op") in self._usable] or loops
         if not loops:
             raise self._no_loop(namespace)
         if len(loops) > 1:
@@ -115,7 +118,7 @@ class LoopSignals:
                 where=self._where,
                 fix=f"its loops are {', '.join(loops)}",
             )
-        signals = {signal for _, signal in self._given}
+        signals = {signal for _, signal in self._usable}
         lacks = [
             topic
             for topic, there in (
