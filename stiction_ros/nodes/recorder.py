@@ -17,7 +17,6 @@ from stiction_ros.nodes.shared.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND, message_class, offered_qos, reader_qos
 from stiction_ros.nodes.shared.peers import Inlet
 from stiction_ros.online.plain_settings import RecorderNodeSettings
-from stiction_ros.records.bag.finish import CLOCK
 from stiction_ros.records.bag.message_definitions import definition
 from stiction_ros.records.bag.writer import BagWriter, Packing, Splitting
 from stiction_ros.records.run.loop_signals import JOINT_STATE
@@ -25,7 +24,7 @@ from stiction_ros.records.storage.log_time import SIMULATED, LogTime
 
 DISCOVERY_PERIOD = 0.05  # s between two looks at the graph
 BAG_PERIOD = 1.0  # s between two looks at the bag
-CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
+CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
 _STAMP = struct.Struct("<iI")  # sec and nanosec behind the 4 bytes of the encapsulation
 OWN = "own"  # in place of an expression: topics of the recorder's namespace and of the graph
 

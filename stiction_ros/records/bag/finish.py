@@ -14,10 +14,8 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.bag.run_metadata import RUN, custom_data, merged
 from stiction_ros.records.storage.bag_metadata import VERSION, BagTopic, yaml_text
 from stiction_ros.records.storage.files import METADATA, found_files
-from stiction_ros.records.storage.log_time import SIMULATED
 from stiction_ros.records.storage.mcap_scan import McapScan
 
-CLOCK = "/clock"
 ROSBAG2 = "rosbag2"
 COMPRESSIONS = {
     "zstd": CompressionType.ZSTD,
@@ -66,23 +64,17 @@ def finish_bag(directory: str | Path, packing: Packing = Packing()) -> None:
 def log_time_caps(files: Sequence[Path]) -> list[int | None]:
     """Return for each file the log time, ns, that what came before simulated time gets.
 
-    It is the first simulated time up to the file in which that is; else None.
+    It is the first simulated time, as the recorder tells it, up to the file in which it does so;
+    else None.
     """
-    found: tuple[int, int] | None = None
     for number, file in enumerate(files):
-        scan, looked = McapScan(file, salvage=True), 0
-        for message in scan.messages():
-            new, looked = scan.metadata[looked:], len(scan.metadata)
-            for name, entry in new:
-                if name == SIMULATED and entry.get("first", "").isdecimal():
-                    return _caps(len(files), number, int(entry["first"]))
-            if found is None and message.topic.name == CLOCK:
-                found = number, message.log_time  # of a recorder that does not tell
-    return _caps(len(files), *found) if found is not None else [None] * len(files)
-
-
-def _caps(files: int, number: int, first: int) -> list[int | None]:
-    return [first if place <= number else None for place in range(files)]
+        scan = McapScan(file, salvage=True)
+        for _ in scan.messages():
+            if scan.simulated is not None:
+                break
+        if scan.simulated is not None:
+            return [scan.simulated if place <= number else None for place in range(len(files))]
+    return [None] * len(files)
 
 
 def rewrite(scan: McapScan, packing: Packing = Packing()) -> McapScan:

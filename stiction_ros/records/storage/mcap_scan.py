@@ -21,6 +21,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from stiction_ros.errors import InputError, storing
 from stiction_ros.records.storage.bag_metadata import INFINITE_NS, BagTopic
+from stiction_ros.records.storage.log_time import SIMULATED
 from stiction_ros.records.storage.packed import SQLITE, conversion, opened
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -63,6 +64,7 @@ class McapScan:
         counts: messages by topic name, as far as :meth:`messages` has come.
         first: least log time met so far, ns; the infinite one while there is no message.
         last: largest log time met so far, ns.
+        simulated: first simulated time that a recorder tells, ns; None so far.
         metadata: name and content of every metadata record met so far.
         chunked: whether a chunk was met.
         finished: whether it ends as a finished file does; False for a file whose writer
@@ -76,6 +78,7 @@ class McapScan:
         self.topics: dict[int, BagTopic] = {}
         self.counts: Counter[str] = Counter()
         self.first, self.last = INFINITE_NS, 0
+        self.simulated: int | None = None
         self.metadata: list[tuple[str, dict[str, str]]] = []
         self.chunked = self.finished = self.damaged = False
         self.notes: list[str] = []
@@ -158,6 +161,8 @@ class McapScan:
                 found.append(RawMessage(topic, time, record.publish_time, record.data))
             elif isinstance(record, mcap_records.Metadata):
                 self.metadata.append((record.name, record.metadata))
+                if record.name == SIMULATED and record.metadata.get("first", "").isdecimal():
+                    self.simulated = int(record.metadata["first"])
             else:
                 self._learn([record])
 

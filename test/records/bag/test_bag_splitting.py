@@ -125,6 +125,7 @@ def test_messages_before_the_clock_get_its_time_across_files(tmp_path: Path) -> 
     bag = Bag(BagWriter(tmp_path / "run", Packing(), Splitting(size=2500)))
     for number in range(40):
         bag.text("/mode", "unaware", wall + number)
+    bag.writer.add_metadata(SIMULATED, {"first": str(5 * SECOND)})
     for second in range(5, 30):
         kind = "rosgraph_msgs/msg/Clock"
         bag.put("/clock", kind, clock(second * SECOND), second * SECOND)
@@ -206,6 +207,7 @@ def test_only_what_came_before_simulated_time_gets_the_first_one(tmp_path: Path)
     wall = 1_700_000_000 * SECOND
     for _ in range(3):
         bag.text("/plant/config", CONFIG, wall)
+    bag.writer.add_metadata(SIMULATED, {"first": str(5 * SECOND)})
     for k in range(20):
         stamp = (5 + k) * SECOND
         if k % 4 == 0:

@@ -22,6 +22,7 @@ from stiction_ros.records.bag.finish import finish_bag
 from stiction_ros.records.bag.messages import read_messages, read_raw
 from stiction_ros.records.bag.writer import BagWriter, Packing
 from stiction_ros.records.storage.bag_metadata import Qos
+from stiction_ros.records.storage.log_time import SIMULATED
 
 
 def filled(bag: Bag) -> Path:
@@ -241,6 +242,7 @@ def test_two_profiles_of_one_topic(tmp_path: Path) -> None:
 def test_what_came_before_the_clock_gets_its_first_time(bag: Bag) -> None:
     wall = 1_790_000_000 * SECOND
     bag.text("/plant/config", "seed: 1", wall)
+    bag.writer.add_metadata(SIMULATED, {"first": str(5 * SECOND)})
     bag.put("/clock", "rosgraph_msgs/msg/Clock", clock(5 * SECOND), 5 * SECOND)
     bag.text("/mode", "unaware", 6 * SECOND)
     bag.writer.close()
