@@ -3,7 +3,7 @@
 import dataclasses
 import enum
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,11 @@ from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.assembly import Found, loop_of
 from stiction_ros.intake.intake_options import LETTERS, CsvColumns, IntakeOptions, OpUnit, TimeUnit
 from stiction_ros.intake.sheets.cells import Cells
-from stiction_ros.intake.sheets.layout import named_columns
-from stiction_ros.intake.sheets.sheet import PIECE, Piece, Sheet
 from stiction_ros.intake.sheets.stamps import DateOrder
+from stiction_ros.intake.sheets.typed import ColumnSheet
 from stiction_ros.intake.tables.plan import plan_of
 from stiction_ros.intake.tables.reading import blocks_of
+from stiction_ros.intake.tables.tags import FileWay
 from stiction_ros.records.csv_writer import column_name
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
@@ -42,27 +42,6 @@ _AS_ARGUMENTS = (
     (re.compile(r"--([a-z]+)-([a-z]+)"), r"\1_\2"),
 )
 """Options of the command to the arguments that are named after them."""
-
-
-class ColumnSheet(Sheet):
-    """Columns in memory by name, shape (N,) each: numbers, times or texts."""
-
-    row_word = "row"
-
-    def __init__(self, name: str, columns: Mapping[str, Any]) -> None:
-        self.path, self.name = Path(name), name
-        self.layout = named_columns([" ".join(key.split()) for key in columns])
-        self._cells = [_cells(values, key) for key, values in columns.items()]
-        lengths = [len(cells) for cells in self._cells]
-        self._count = max(lengths, default=0)
-        if min(lengths, default=0) < self._count:
-            said = ", ".join(f"{key} {n}" for key, n in zip(columns, lengths, strict=True))
-            raise InputError(f"the columns differ in length: {said}")
-
-    def pieces(self, rows: int | None = None) -> Iterator[Piece]:
-        for first in range(0, self._count, size := rows or PIECE):
-            last = min(first + size, self._count)
-            yield [cells[first:last] for cells in self._cells], np.arange(first, last)
 
 
 def record_from_arrays(
@@ -145,8 +124,20 @@ def _record(
     wanted = IntakeOptions(columns=chosen, **given)
     try:
         with foreign(name):
-            sheet = ColumnSheet(name, columns)
-            blocks = blocks_of(sheet, plan_of(sheet, wanted, None), wanted, None)
+            cells = [_cells(values, key) for key, values in columns.items()]
+            if len(set(map(len, cells))) > 1:
+                said = (f"{key} {len(one)}" for key, one in zip(columns, cells, strict=True))
+                raise InputError(f"the columns differ in length: {', '.join(said)}")
+            count = len(cells[0]) if cells else 0
+            sheet = ColumnSheet(
+                Path(name),
+                list(columns),
+                lambda size: ([c[k : k + size] for c in cells] for k in range(0, count, size)),
+                0,
+            )
+            sheet.name = name
+            way = FileWay(wanted)
+            blocks = blocks_of(sheet, plan_of(sheet, way), way)
             (own,) = blocks.values()
             loop = loop_of(Found(name, name, tuple(own), named=True), wanted)
             found = longest_part(loop.parts)

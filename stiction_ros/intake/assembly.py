@@ -42,7 +42,7 @@ class Found:
 def loop_of(found: Found, options: IntakeOptions) -> Loop:
     """Return a loop with its records; InputError when it cannot be made into records, and why."""
     _refuse_incomplete(found)
-    rules = repairs.Rules(options.strict)
+    rules = repairs.Rules(options.strict, [note for one in found.blocks for note in one.notes])
     for note, block in {note: one for one in found.blocks for note in one.mended}.items():
         with foreign(block.path):
             rules.tell(note)
@@ -54,8 +54,6 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     for name, count in differing.items():
         said = f"{name}: {plural(count, 'value')} at a stamp that another table has differ"
         rules.tell(f"{said}: the later table counts", "leave one of them out")
-    notes = [*dict.fromkeys(note for one in found.blocks for note in one.notes), *rules.told]
-    rules.told.clear()
     block = repairs.without_outliers(block, rules)
     refuse_twice(block)
     block, unit, note = in_percent(block, options.op_unit, named=found.named)
@@ -65,7 +63,7 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     parts: list[Record] = []
     for run in repairs.in_order(block, rules):
         parts += _records(manual_marked(run, rules, options.automatic), found, options, rules)
-    notes = list(dict.fromkeys((*notes, *rules.told)))
+    notes = dict.fromkeys(rules.told)
     whole = tuple(dataclasses.replace(part, notes=(*notes, *part.notes)) for part in parts)
     every = tuple(dict.fromkeys(note for part in whole for note in part.notes))
     return dataclasses.replace(

@@ -13,7 +13,7 @@ from stiction_ros.intake.loop import Loop, spreads_of_records
 from stiction_ros.intake.sheets.sheet import SUFFIXES, Sheet, stem
 from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.intake.tables.block import Block
-from stiction_ros.intake.tables.plan import Plan, Shape, plan_of
+from stiction_ros.intake.tables.plan import Plan, plan_of
 from stiction_ros.intake.tables.reading import blocks_of
 from stiction_ros.intake.tables.tags import FileWay, TagList, read_tag_list
 from stiction_ros.records.parts import longest_part
@@ -78,17 +78,17 @@ def _loops(files: Iterable[Path], options: IntakeOptions, tags: TagList | None) 
         for sheet in sheets:
             try:
                 with foreign(file):
-                    plan = plan_of(sheet, way.options, way.tags)
+                    plan = plan_of(sheet, way)
             except InputError as error:
                 yield Loop(sheet.name, (file,), (), problem=str(error))
                 continue
             table = _Table(sheet, plan, way)
-            if plan.shape is Shape.ONE:
+            if plan.single:
                 yield from _read([table])
             else:
                 tables.append(table)
-    long = [table for table in tables if table.plan.shape is Shape.LONG]
-    wide = [table for table in tables if table.plan.shape is Shape.WIDE]
+    long = [table for table in tables if table.plan.long is not None]
+    wide = [table for table in tables if table.plan.long is None]
     for group in (long, *_groups(wide)):
         yield from _read(group)
 
@@ -236,7 +236,7 @@ def _read(group: Sequence[_Table]) -> Iterator[Loop]:
         path = table.sheet.path
         try:
             with foreign(path):
-                read = blocks_of(table.sheet, table.plan, table.way.options, table.way.tags)
+                read = blocks_of(table.sheet, table.plan, table.way)
                 if not read and table.plan.long is not None:
                     raise InputError(
                         "has no tag such as FIC101.PV or FIC101/OP in column "
@@ -256,7 +256,7 @@ def _read(group: Sequence[_Table]) -> Iterator[Loop]:
 
 def _loop(name: str, blocks: tuple[Block, ...], group: Sequence[_Table]) -> Loop:
     """Return a loop of tables, with its problem where it cannot be made into records."""
-    single = group[0].plan.shape is Shape.ONE
+    single = group[0].plan.single
     files = {block.path for block in blocks}
     own = [table for table in group if table.sheet.path in files]
     named = all(table.plan.named for table in own)

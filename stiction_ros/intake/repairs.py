@@ -15,7 +15,7 @@ from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.intake.words import WORDS
 from stiction_ros.records.record import Quality
-from stiction_ros.records.regular import spread_evenly
+from stiction_ros.records.regular import sample_time, spread_evenly
 from stiction_ros.signals.holds import stretches
 from stiction_ros.texts import plural
 
@@ -136,12 +136,7 @@ def in_order(block: Block, rules: Rules) -> list[Block]:
     if (steps > 0).all():
         return [block]
     if rules.strict:
-        row = int(np.argmax(steps <= 0)) + 1
-        first, then = block.clock.start + time[row - 1 : row + 1]
-        raise InputError(
-            f"time does not increase at {block.place(row)} ({first:.9g}, then {then:.9g} s)",
-            fix="sort the rows and remove those that are there twice",
-        )
+        sample_time(block.clock.start + time, str(block.path), block.place)  # tells which row
     back = np.flatnonzero(steps < 0)
     if len(back) and len(back) <= 0.001 * len(time) + 3:
         runs = np.split(np.arange(len(time)), back + 1)

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import re
-from collections import Counter
+import sys
 from collections.abc import Sequence
 
 import numpy as np
@@ -58,8 +58,10 @@ class Numbers:
     """A column of numbers as it grows."""
 
     decimal_comma: bool  # whether a lone comma in a number is decimal, and sets no thousands apart
-    # what stood in the place of numbers, with its count; empty cells as ``''``
-    words: Counter[str] = dataclasses.field(default_factory=Counter)
+    words: dict[int, str] = dataclasses.field(
+        default_factory=dict
+    )  # row to what is no number there
+    _count: int = 0
     _pieces: list[FloatArray] = dataclasses.field(default_factory=list)
     _blank: list[NDArray[np.bool_]] = dataclasses.field(default_factory=list)
 
@@ -74,7 +76,9 @@ class Numbers:
         for row in np.flatnonzero(~np.isfinite(values)).tolist():
             text = "" if of_numbers else str(cells[row]).strip()
             blank[row], values[row] = not text, math.nan
-            self.words[text[:SHOWN]] += 1
+            if text:
+                self.words[self._count + row] = sys.intern(text[:SHOWN])
+        self._count += len(cells)
         self._pieces.append(values)
         self._blank.append(blank)
 

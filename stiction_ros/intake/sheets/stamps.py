@@ -132,8 +132,8 @@ class Stamps:
             read = self._numbers.values()
             strange = ~np.isfinite(read) & ~self._numbers.blank()
             if strange.any():
-                text = next(word for word in self._numbers.words if word)
-                self._firsts[_No.STRANGE] = Wrong(int(np.argmax(strange)), text)
+                row = int(np.argmax(strange))
+                self._firsts[_No.STRANGE] = Wrong(row, self._numbers.words[row])
             values = np.where(strange, np.inf, read)
             first = float(values[np.argmax(np.isfinite(values))]) if len(values) else 0.0
             first = first if np.isfinite(first) else 0.0

@@ -1,13 +1,12 @@
-"""Workbooks and Parquet files, by packages of the extra ``survey``."""
+"""Tables of columns, and by packages of the extra ``survey`` Parquet files and workbooks."""
 
 import contextlib
 import datetime
 import functools
 import re
 import warnings
-import weakref
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,112 +26,72 @@ UNSTORED = re.compile(
 """A cell with a formula and no value."""
 
 
+Batches = Callable[[int], Iterator[Sequence[Cells]]]
+"""Reads a table anew, so many rows at a time: the cells of each column."""
+
+
+class ColumnSheet(Sheet):
+    """Columns of numbers, stamps or texts, read in batches; rows count from ``first``."""
+
+    row_word = "row"
+
+    def __init__(self, path: Path, names: Sequence[str], batches: Batches, first: int) -> None:
+        self.path, self.name = path, stem(path)
+        self.layout = named_columns([" ".join(name.split()) for name in names])
+        self._batches, self._first = batches, first
+
+    def pieces(self, rows: int | None = None) -> Iterator[Piece]:
+        line = self._first
+        for columns in self._batches(rows or max(PIECE // max(len(self.layout.header), 1), 256)):
+            yield columns, np.arange(line, line + len(columns[0]))
+            line += len(columns[0])
+
+
 def open_sheets(path: Path) -> Sequence[Sheet]:
     """Open the tables of a file, whatever kind it is; a workbook may hold several."""
     first = text.magic(path)
     if first.startswith(text.PARQUET):
-        return [ParquetSheet(path)]
+        return [_parquet(path)]
     if first.startswith(text.ZIP) and _holds_workbook(path):
         return _workbook(path)
     return [text_sheet(path)]
 
 
-class ParquetSheet(Sheet):
-    """A Parquet file; numbers and stamps come as they are."""
+def _parquet(path: Path) -> Sheet:
+    """Open a Parquet file; numbers and stamps come as they are."""
+    try:
+        import pyarrow as arrow
+        import pyarrow.parquet as parquet
+    except ImportError:
+        raise InputError("needs pyarrow", fix=INSTALL) from None
 
-    row_word = "row"
-
-    def __init__(self, path: Path) -> None:
+    @contextlib.contextmanager
+    def opened() -> Iterator[Any]:
         try:
-            import pyarrow as arrow
-            import pyarrow.parquet as parquet
-        except ImportError:
-            raise InputError("needs pyarrow", fix=INSTALL) from None
-        self.path, self.name, self._arrow, self._parquet = path, stem(path), arrow, parquet
-        with self._open() as file:
-            names = [" ".join(str(name).split()) for name in file.schema_arrow.names]
-        self.layout = named_columns(names)
+            with parquet.ParquetFile(path) as file:
+                yield file
+        except (arrow.ArrowException, OSError) as error:
+            raise InputError(f"cannot be read ({str(error).splitlines()[0][:80]})") from None
 
-    def pieces(self, rows: int | None = None) -> Iterator[Piece]:
-        size = rows or max(PIECE // max(len(self.layout.header), 1), 256)
-        first = 1
-        with self._open() as file:
-            for batch in file.iter_batches(batch_size=size):
-                columns = [self._cells(column) for column in batch.columns]
-                yield columns, np.arange(first, first + batch.num_rows)
-                first += batch.num_rows
-
-    def _cells(self, column: Any) -> Cells:
-        kind = column.type
-        types = self._arrow.types
+    def cells(column: Any) -> Cells:
+        kind, types = column.type, arrow.types
         if types.is_timestamp(kind) or types.is_date(kind):
-            stamps = column.cast(self._arrow.timestamp("us", tz=getattr(kind, "tz", None)))
-            whole = stamps.cast(self._arrow.int64()).fill_null(np.iinfo(np.int64).min)
+            stamps = column.cast(arrow.timestamp("us", tz=getattr(kind, "tz", None)))
+            whole = stamps.cast(arrow.int64()).fill_null(np.iinfo(np.int64).min)
             return np.asarray(whole.to_numpy(zero_copy_only=False)).view("datetime64[us]")
         if types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind):
-            values = column.cast(self._arrow.float64()).to_numpy(zero_copy_only=False)
+            values = column.cast(arrow.float64()).to_numpy(zero_copy_only=False)
             return np.asarray(values, dtype=np.float64)
         return ["" if value is None else str(value) for value in column.to_pylist()]
 
-    @contextlib.contextmanager
-    def _open(self) -> Iterator[Any]:
-        try:
-            with self._parquet.ParquetFile(self.path) as file:
-                yield file
-        except (self._arrow.ArrowException, OSError) as error:
-            raise InputError(f"cannot be read ({str(error).splitlines()[0][:80]})") from None
+    def batches(size: int) -> Iterator[Sequence[Cells]]:
+        with opened() as file:
+            for batch in file.iter_batches(batch_size=size):
+                yield list(map(cells, batch.columns))
 
-
-class _Book:
-    """A workbook that its sheets share: what they have in common is read once."""
-
-    def __init__(self, path: Path) -> None:
-        try:
-            import openpyxl
-        except ImportError:
-            raise InputError("needs openpyxl", fix=INSTALL) from None
-        self.path = path
-        with self.damage_told(), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of styles and the like, which are not read
-            # From an open file: openpyxl asks for the end of a name.
-            file = path.open("rb")
-            self.book = openpyxl.load_workbook(file, read_only=True, data_only=True)
-        for opened in (self.book, file):
-            weakref.finalize(self, opened.close)
-
-    @contextlib.contextmanager
-    def damage_told(self) -> Iterator[None]:
-        """Turn what openpyxl raises into an InputError."""
-        try:
-            yield
-        except (zipfile.BadZipFile, KeyError, OSError, ValueError) as error:
-            if isinstance(error, InputError):
-                raise
-            fix = "save it as .xlsx or CSV"
-            raise InputError(f"is no workbook ({error})", fix=fix) from None
-
-    @contextlib.contextmanager
-    def rows(self, title: str) -> Iterator[Iterator[tuple[int, list[str]]]]:
-        """Open a sheet; its rows with their numbers."""
-        with self.damage_told():
-            yield (
-                (line, [_text(value) for value in row])
-                for line, row in enumerate(self.book[title].iter_rows(values_only=True), start=1)
-            )
-
-    def refuse_unstored(self, title: str) -> None:
-        """Raise where a cell has a formula and no value, as programs leave it that write them."""
-        with (
-            self.damage_told(),
-            zipfile.ZipFile(self.path) as archive,
-            archive.open(self.book[title]._worksheet_path) as file,
-        ):
-            found = UNSTORED.search(file.read(PIECE))
-        if found:
-            raise InputError(
-                f"cell {found[1].decode()} of {title} is a formula without its value",
-                fix="open it in a spreadsheet program and save it, as CSV or as .xlsx",
-            )
+    with opened() as file:
+        names = list(map(str, file.schema_arrow.names))
+    return ColumnSheet(path, names, batches, 1)
 
 
 def _holds_workbook(path: Path) -> bool:
@@ -146,20 +105,59 @@ def _holds_workbook(path: Path) -> bool:
 
 
 def _workbook(path: Path) -> Sequence[Sheet]:
-    book, found = _Book(path), []
-    refused = InputError("has no sheet")
-    for title in reversed([sheet.title for sheet in book.book.worksheets]):
-        try:
-            book.refuse_unstored(title)
-            rows = functools.partial(book.rows, title)
-            found.append(RowSheet(path, f"{stem(path)}:{title}", rows, ""))
-        except InputError as error:
-            refused = error
+    """Open the sheets of a workbook, those without a table left out if there are others."""
+    found: list[RowSheet] = []
+    refused: list[InputError] = []
+    with _book(path) as book:
+        for sheet in book.worksheets:
+            try:
+                _refuse_unstored(path, sheet)
+                rows = functools.partial(_rows, path, sheet.title)
+                found.append(RowSheet(path, f"{stem(path)}:{sheet.title}", rows, ""))
+            except InputError as error:
+                refused.append(error)
     if not found:
-        raise refused
+        raise refused[0] if refused else InputError("has no sheet")
     if len(found) == 1:
         found[0].name = stem(path)
-    return found[::-1]
+    return found
+
+
+@contextlib.contextmanager
+def _book(path: Path) -> Iterator[Any]:
+    """Open a workbook; what openpyxl raises is an InputError."""
+    try:
+        import openpyxl
+    except ImportError:
+        raise InputError("needs openpyxl", fix=INSTALL) from None
+    try:
+        # From an open file: openpyxl asks for the end of a name.
+        with warnings.catch_warnings(), path.open("rb") as file:
+            warnings.simplefilter("ignore")  # of styles and the like, which are not read
+            yield openpyxl.load_workbook(file, read_only=True, data_only=True)
+    except (zipfile.BadZipFile, KeyError, OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"is no workbook ({error})", fix="save it as .xlsx or CSV") from None
+
+
+@contextlib.contextmanager
+def _rows(path: Path, title: str) -> Iterator[Iterator[tuple[int, list[str]]]]:
+    """Open a sheet; its rows with their numbers."""
+    with _book(path) as book:
+        rows = enumerate(book[title].iter_rows(values_only=True), start=1)
+        yield ((line, list(map(_text, row))) for line, row in rows)
+
+
+def _refuse_unstored(path: Path, sheet: Any) -> None:
+    """Raise where a cell has a formula and no value, as programs leave it that write them."""
+    with zipfile.ZipFile(path) as archive, archive.open(sheet._worksheet_path) as file:
+        found = UNSTORED.search(file.read(PIECE))
+    if found:
+        raise InputError(
+            f"cell {found[1].decode()} of {sheet.title} is a formula without its value",
+            fix="open it in a spreadsheet program and save it, as CSV or as .xlsx",
+        )
 
 
 def _text(value: Any) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.intake.sheets.names import Tag
-from stiction_ros.intake.sheets.stamps import Clock, Times
+from stiction_ros.intake.sheets.stamps import Clock
 from stiction_ros.records.record import QualityArray
 
 FlagArray = NDArray[np.bool_]
@@ -72,11 +72,6 @@ class Block:
     def with_columns(self, columns: Mapping[Key, Column]) -> "Block":
         """Return the block with other columns in the place of those of the same signals."""
         return dataclasses.replace(self, columns={**self.columns, **columns})
-
-    def has_times(self, times: Times) -> bool:
-        """Return whether its times are the given ones."""
-        alike = np.array_equal(self.time, times.seconds, equal_nan=True)
-        return self.clock == times.clock and alike
 
     def rows(self, chosen: NDArray[np.intp] | FlagArray) -> "Block":
         """Return some of its rows."""

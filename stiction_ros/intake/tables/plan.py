@@ -1,7 +1,6 @@
 """What the columns of a table are: one loop, many side by side, or one value a row."""
 
 import dataclasses
-import enum
 import re
 import shlex
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -25,7 +24,7 @@ from stiction_ros.intake.tables.clock import (
     time_column,
 )
 from stiction_ros.intake.tables.qualities import qualities_of, quality_places
-from stiction_ros.intake.tables.tags import TagList
+from stiction_ros.intake.tables.tags import FileWay
 from stiction_ros.records.csv_writer import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
 
 LOOKED_AT = 1000  # rows by which it is told what stands in a column
@@ -40,14 +39,13 @@ class OneValue(NamedTuple):
     unit: int | None
 
 
-def one_value(
-    sheet: Sheet, options: IntakeOptions, tags: TagList | None, top: Sequence[Cells]
-) -> OneValue | None:
+def one_value(sheet: Sheet, way: FileWay, top: Sequence[Cells]) -> OneValue | None:
     """Return the columns of a table with one value a row; None for another table.
 
     It is told by the names of its columns or, where none of them is OP or PV, by what stands
     there: texts that name signals, stamps, numbers; refused where several may hold the values.
     """
+    options, read = way.options, way.read
     named = options.columns.time
     unit = _first(sheet, tag_names.UNIT_NAMES)
     if options.long is not None:
@@ -56,7 +54,7 @@ def one_value(
     usual = _first(sheet, tag_names.TAG_NAMES), _first(sheet, tag_names.VALUE_NAMES)
     if usual[0] is not None and usual[1] is not None and usual[0] != usual[1]:
         return OneValue(usual[0], time_column(sheet, named), usual[1], unit)
-    header, read = sheet.layout.header, tag_names.read_tag if tags is None else tags.read
+    header = sheet.layout.header
     if any(told.loop or told.signal in ("op", "pv") for told in map(read, header) if told):
         return None
     kinds = list(map(kind_of, top))
@@ -108,19 +106,11 @@ def _first(sheet: Sheet, names: tuple[str, ...]) -> int | None:
     return next((header.index(name) for name in names if name in header), None)
 
 
-class Shape(enum.Enum):
-    """How a table holds loops."""
-
-    ONE = enum.auto()
-    WIDE = enum.auto()
-    LONG = enum.auto()
-
-
 @dataclasses.dataclass(frozen=True)
 class Plan:
     """Which column is what."""
 
-    shape: Shape  # of the table
+    single: bool  # whether the table holds one loop, whose signals have names of no loop
     time: TimeColumn  # column of the times; its place is -1 where rows are a sample time apart
     loops: Mapping[str, Mapping[Key, int]]  # loop to its signals' columns; empty for a long table
     own: Mapping[int, TimeColumn] = dataclasses.field(default_factory=dict)  # where not of all
@@ -132,22 +122,22 @@ class Plan:
     notes: tuple[str, ...] = ()  # what was left out
 
 
-def plan_of(sheet: Sheet, options: IntakeOptions, tags: TagList | None) -> Plan:
+def plan_of(sheet: Sheet, way: FileWay) -> Plan:
     """Return what the columns of a table are; InputError for missing or repeated ones."""
     empty: Sequence[Cells] = [[] for _ in sheet.layout.header]
     top = next((columns for columns, _ in sheet.pieces(LOOKED_AT)), empty)
+    options = way.options
     if options.long is None and (options.columns.op or options.columns.pv):
         return _one_loop(sheet, options, top)
-    long = one_value(sheet, options, tags, top)
+    long = one_value(sheet, way, top)
     if long is not None:
         taken = {long.tag, *long.time, long.value, long.unit}
         whole = tuple(quality_places(sheet.layout.header, top, taken))
-        named = tags is not None and bool(tags.own)
-        return Plan(Shape.LONG, long.time, {}, whole_quality=whole, long=long, named=named)
+        return Plan(False, long.time, {}, whole_quality=whole, long=long, named=bool(way.own))
     written = tagged_columns(sheet.layout.given)
-    if written and tags is None and set(written["op"]) != set(written["pv"]):
+    if written and way.tags is None and set(written["op"]) != set(written["pv"]):
         return _one_loop(sheet, options, top)
-    return _wide(sheet, options, tags, top) or _one_loop(sheet, options, top)
+    return _wide(sheet, way, top) or _one_loop(sheet, options, top)
 
 
 def _one_loop(sheet: Sheet, options: IntakeOptions, top: Sequence[Cells]) -> Plan:
@@ -188,7 +178,7 @@ def _one_loop(sheet: Sheet, options: IntakeOptions, top: Sequence[Cells]) -> Pla
     if mode is not None and mode not in chosen.values() and mode != clocks.time.place:
         chosen[Key("mode", "")] = mode
     named = bool(columns.op and columns.pv) or bool(written)
-    return _plan(Shape.ONE, sheet, top, {sheet.name: chosen}, clocks, named=named)
+    return _plan(sheet, top, {sheet.name: chosen}, clocks, single=True, named=named)
 
 
 class _Clocks(NamedTuple):
@@ -275,55 +265,49 @@ def _usual(sheet: Sheet, signal: str) -> str | None:
     return next((n for n in sheet.layout.header if read_tag(n) == Tag("", signal)), None)
 
 
-def _wide(
-    sheet: Sheet, options: IntakeOptions, tags: TagList | None, top: Sequence[Cells]
-) -> Plan | None:
+def _wide(sheet: Sheet, way: FileWay, top: Sequence[Cells]) -> Plan | None:
     """Return the plan of a table whose columns are tags; None when none is."""
     loops: dict[str, dict[Key, int]] = {}
     notes: list[str] = []
-    read = read_tag if tags is None else tags.read
-    for index, (given, bare) in enumerate(
-        zip(sheet.layout.given, sheet.layout.header, strict=True)
-    ):
-        tag = read(bare) if tags is None else read(given) or read(bare)
+    for index, given in enumerate(sheet.layout.given):
+        bare = sheet.layout.header[index]
+        tag = way.read(bare) if way.tags is None else way.read(given) or way.read(bare)
         if tag is None and bare.casefold() in VALUE_NAMES:
-            tag = read(sheet.name)
+            tag = way.read(sheet.name)
         if tag is None or not tag.loop or tag.quality:
             continue
         first = loops.setdefault(tag.loop, {}).setdefault(Key.of(tag), index)
         if first != index:
             said = f"{tag.signal.upper()} of {tag.loop} is {sheet.layout.given[first]}"
             notes.append(f"{given} is left out: {said}")
-    if tags is not None:
-        _refuse_strange(sheet, tags)
+    _refuse_strange(sheet, way.own)
     if not loops:
         return None
     places = [index for signals in loops.values() for index in signals.values()]
-    time = options.columns.time
+    time = way.options.columns.time
     taken = {*places, None if time is None else sheet.find(time)}
     notes += _without_loop(sheet, loops, taken)
     places = [index for signals in loops.values() for index in signals.values()]
-    clocks = _clocks(sheet, places, options, top)
-    named = tags is not None and bool(tags.own)
-    return _plan(Shape.WIDE, sheet, top, loops, clocks, notes, named=named)
+    clocks = _clocks(sheet, places, way.options, top)
+    clocks = clocks._replace(notes=(*notes, *clocks.notes))
+    return _plan(sheet, top, loops, clocks, single=False, named=bool(way.own))
 
 
 def _plan(
-    shape: Shape,
     sheet: Sheet,
     top: Sequence[Cells],
     loops: Mapping[str, Mapping[Key, int]],
     clocks: _Clocks,
-    notes: Sequence[str] = (),
     *,
+    single: bool,
     named: bool,
 ) -> Plan:
     """Return a plan of signals side by side, with the columns of their qualities."""
     places = {index for signals in loops.values() for index in signals.values()}
-    time, own, told = clocks
+    time, own, notes = clocks
     of_time = {place for clock in (time, *own.values()) for place in clock}
     beside, whole = qualities_of(sheet.layout.header, top, places, of_time)
-    return Plan(shape, time, loops, own, beside, whole, named=named, notes=(*notes, *told))
+    return Plan(single, time, loops, own, beside, whole, named=named, notes=tuple(notes))
 
 
 def _without_loop(
@@ -344,10 +328,10 @@ def _without_loop(
     return notes
 
 
-def _refuse_strange(sheet: Sheet, tags: TagList) -> None:
+def _refuse_strange(sheet: Sheet, own: Mapping[str, str]) -> None:
     """Raise where rows for this file name what is none of its columns; sheets share theirs."""
     known = set(map(folded, (*sheet.layout.given, *sheet.layout.header, sheet.name)))
-    strange = [tag for key, tag in tags.own.items() if key not in known]
+    strange = [tag for key, tag in own.items() if key not in known]
     if strange and sheet.name == stem(sheet.path):
         raise InputError(
             f"has no column {' and no '.join(strange)}",

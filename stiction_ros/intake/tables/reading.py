@@ -10,28 +10,26 @@ from numpy.typing import NDArray
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import IntakeOptions
-from stiction_ros.intake.sheets.cells import Cells, Numbers, Words
-from stiction_ros.intake.sheets.names import read_tag, unit_in
+from stiction_ros.intake.sheets.cells import Numbers, Words
+from stiction_ros.intake.sheets.names import unit_in
 from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.stamps import Clock, Stamps, Times, Wrong
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, in_seconds
 from stiction_ros.intake.tables.plan import OneValue, Plan
 from stiction_ros.intake.tables.qualities import bad_qualities
-from stiction_ros.intake.tables.tags import TagList
+from stiction_ros.intake.tables.tags import FileWay
 from stiction_ros.records.csv_writer import QUALITY
 from stiction_ros.records.record import QUALITY_WORDS, QualityArray
 
 Reader = tuple[int, Numbers] | tuple[int, Words]
 
 
-def blocks_of(
-    sheet: Sheet, plan: Plan, options: IntakeOptions, tags: TagList | None
-) -> dict[str, list[Block]]:
+def blocks_of(sheet: Sheet, plan: Plan, way: FileWay) -> dict[str, list[Block]]:
     """Read a table into blocks, by the name of their loop."""
     if plan.long is not None:
-        return _long(sheet, plan, plan.long, options, tags)
-    return _beside(sheet, plan, options)
+        return _long(sheet, plan, plan.long, way)
+    return _beside(sheet, plan, way.options)
 
 
 def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[Block]]:
@@ -48,14 +46,14 @@ def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[
         words[quality] = Words()
     clocks = dict.fromkeys((plan.time, *plan.own.values()))
     lines, times = _read(sheet, [*numbers.items(), *words.items()], clocks, options, least=2)
+    alike = {clock: next(k for k in times if _same(times[k], times[clock])) for clock in times}
     mask, whole_bad, told = _whole_quality(sheet, plan, words)
     notes = [*plan.notes, *(time.note for time in times.values()), *told]
     found: dict[str, list[Block]] = {}
     for name, signals in plan.loops.items():
-        blocks: list[Block] = []
+        of_clock: dict[TimeColumn, dict[Key, Column]] = {}
         said = list(notes)
         for key, index in signals.items():
-            time = times[plan.own.get(index, plan.time)]
             given = sheet.layout.given[index]
             if key.signal == "mode":
                 column = _mode(given, words[index])
@@ -65,67 +63,54 @@ def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[
                 said += own
                 unit = sheet.layout.units[index] or unit_in(given)
                 read = numbers[index]
-                column = Column(given, read.values(), read.blank(), read.words, unit)
+                counts = Counter(read.words.values())
+                column = Column(given, read.values(), read.blank(), counts, unit)
                 column = _without_bad(column, bad)
-            same = next((k for k, other in enumerate(blocks) if other.has_times(time)), None)
-            if same is None:
-                blocks.append(_block(sheet, time, lines, {key: column}))
-            else:
-                blocks[same].columns[key] = column
-        for block in blocks:
-            block.mask, block.notes = mask, tuple(dict.fromkeys(filter(None, said)))
+            of_clock.setdefault(alike[plan.own.get(index, plan.time)], {})[key] = column
+        blocks = [
+            _block(sheet, times[clock], lines, columns, said, mask)
+            for clock, columns in of_clock.items()
+        ]
         found[name] = list(map(_filled_rows, blocks)) if plan.own else blocks
     return found
 
 
-def _long(
-    sheet: Sheet, plan: Plan, long: OneValue, options: IntakeOptions, tags: TagList | None
-) -> dict[str, list[Block]]:
+def _long(sheet: Sheet, plan: Plan, long: OneValue, way: FileWay) -> dict[str, list[Block]]:
     """Read a table with one value a row: one block a tag."""
-    names, units, values, text = Words(), Words(), Numbers(sheet.decimal_comma), _OnlyWords()
+    names, units, values = Words(), Words(), Numbers(sheet.decimal_comma)
     quality = {index: Words() for index in plan.whole_quality}
-    readers: list[Reader] = [(long.tag, names), (long.value, values), (long.value, text)]
-    readers += quality.items()
+    readers: list[Reader] = [(long.tag, names), (long.value, values), *quality.items()]
     if long.unit is not None:
         readers.append((long.unit, units))
-    lines, times = _read(sheet, readers, [plan.time], options, least=1)
-    time, numbers, blank = times[plan.time], values.values(), values.blank()
+    lines, times = _read(sheet, readers, [plan.time], way.options, least=1)
+    time, whole = times[plan.time], Column("", values.values(), values.blank())
     bad, notes = _bad_rows(sheet, quality)
-    tag_codes, codes, shown = names.codes(), text.codes(), list(text.known)
+    tag_codes = names.codes()
     unit_of = dict(zip(tag_codes.tolist(), units.codes().tolist(), strict=False))
     unit_words = list(units.known)
     order = np.argsort(tag_codes, kind="stable")
     edges = np.searchsorted(tag_codes[order], np.arange(len(names.known) + 1))
     found: dict[str, list[Block]] = {}
     for code, name in enumerate(names.known):
-        tag = tags.read(name) if tags is not None else read_tag(name)
+        tag = way.read(name)
         if tag is None or not tag.loop or tag.quality:
             continue
         rows = order[edges[code] : edges[code + 1]]
-        said = [shown[c] for c in codes[rows].tolist()]
+        column, said = whole.rows(rows), [values.words.get(row, "") for row in rows.tolist()]
         if tag.signal == "mode":
-            modes, told = Words(), zip(said, numbers[rows].tolist(), strict=True)
+            modes, told = Words(), zip(said, column.values.tolist(), strict=True)
             modes.add([word or ("" if value != value else f"{value:g}") for word, value in told])
             column = _mode(name, modes)
         else:
-            column = Column(name, numbers[rows], blank[rows], words=Counter(filter(None, said)))
+            words = Counter(filter(None, said))
+            column = dataclasses.replace(column, name=name, words=words)
             column = _without_bad(column, None if bad is None else bad[rows])
         unit = unit_words[unit_of[code]].strip() if code in unit_of else ""
         column.unit = unit or unit_in(name)
         own = time._replace(seconds=time.seconds[rows])
-        block = _block(sheet, own, lines[rows], {Key.of(tag): column})
-        block.notes = tuple(filter(None, (time.note, *notes)))
+        block = _block(sheet, own, lines[rows], {Key.of(tag): column}, [time.note, *notes])
         found.setdefault(tag.loop, []).append(block)
     return found
-
-
-class _OnlyWords(Words):
-    """A column of numbers and words; numbers count as empty, so that few different are left."""
-
-    def add(self, cells: Cells) -> None:
-        if isinstance(cells, np.ndarray):
-            cells = [""] * len(cells)
-        super().add(["" if cell[-1:].isdigit() else cell.strip() for cell in cells])
 
 
 def _read(
@@ -165,8 +150,18 @@ def _read(
     return place, times
 
 
+def _same(one: Times, other: Times) -> bool:
+    alike = np.array_equal(one.seconds, other.seconds, equal_nan=True)
+    return alike and one.clock == other.clock
+
+
 def _block(
-    sheet: Sheet, times: Times, lines: NDArray[np.int64], columns: dict[Key, Column]
+    sheet: Sheet,
+    times: Times,
+    lines: NDArray[np.int64],
+    columns: dict[Key, Column],
+    notes: Iterable[str],
+    mask: QualityArray | None = None,
 ) -> Block:
     return Block(
         path=sheet.path,
@@ -175,6 +170,8 @@ def _block(
         time=times.seconds,
         lines=lines,
         columns=columns,
+        mask=mask,
+        notes=tuple(dict.fromkeys(filter(None, notes))),
         stray="" if times.wrong is None else times.wrong.said,
         mended=tuple(sheet.mended),
     )

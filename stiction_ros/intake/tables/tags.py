@@ -14,7 +14,7 @@ from stiction_ros.intake.intake_options import (
     known_time_unit,
 )
 from stiction_ros.intake.sheets.cells import as_text, number
-from stiction_ros.intake.sheets.names import SIGNALS, Tag, folded
+from stiction_ros.intake.sheets.names import SIGNALS, Tag, folded, read_tag
 from stiction_ros.intake.sheets.stamps import DateOrder
 from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.intake.words import WORDS
@@ -120,14 +120,18 @@ def _parts(path: str) -> list[str]:
 
 @dataclasses.dataclass(frozen=True)
 class FileWay:
-    """How one file is read: what a tag list says of it before what is said of all.
-
-    Without ``tags`` its loops are found by their names; ``units`` are those of their OP.
-    """
+    """How one file is read: what a tag list says of it before what is said of all."""
 
     options: IntakeOptions
-    tags: "TagList | None" = None
-    units: Mapping[str, OpUnit] = dataclasses.field(default_factory=dict)
+    # loop and signal of each tag in small letters; None finds them by the names
+    tags: Mapping[str, Tag] | None = None
+    own: Mapping[str, str] = dataclasses.field(default_factory=dict)  # tags that its rows name
+    units: Mapping[str, OpUnit] = dataclasses.field(default_factory=dict)  # of OP, by its rows
+    listed: Mapping[str, OpUnit] = dataclasses.field(default_factory=dict)  # of OP, by all others
+
+    def read(self, name: str) -> Tag | None:
+        """Return what a tag or the name of a column says, None when it says nothing."""
+        return read_tag(name) if self.tags is None else self.tags.get(folded(name))
 
     def op_unit(self, loop: str, *, single: bool) -> OpUnit | None:
         """Return the unit of OP that is said of a loop; None takes it from the export.
@@ -137,8 +141,7 @@ class FileWay:
         own = self.units.get(loop)
         if own is None and single and len(self.units) == 1:
             (own,) = self.units.values()
-        listed = None if self.tags is None else self.tags.units.get(loop)
-        return own or self.options.op_unit or listed
+        return own or self.options.op_unit or self.listed.get(loop)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,17 +150,11 @@ class TagList:
 
     loops: Mapping[str, Tag]  # name of the loop, signal, for each tag in small letters
     units: Mapping[str, OpUnit]  # unit of OP of loops of which the list says it
-    rows: Mapping[str, Sequence[TagRow]] = dataclasses.field(default_factory=dict)  # for one file
-    # in the list of a file the tags that its rows name, by their small letters
-    own: Mapping[str, str] = dataclasses.field(default_factory=dict)
-
-    def read(self, name: str) -> Tag | None:
-        """Return what a tag is, None when the list does not have it."""
-        return self.loops.get(folded(name))
+    rows: Mapping[str, Sequence[TagRow]]  # rows for one file, by its name
 
     def way_of(self, path: Path, options: IntakeOptions) -> FileWay:
         """Return how a file is read; InputError if its rows contradict each other."""
-        rows = self.rows_of(path)
+        rows = self._rows_of(path)
         said: dict[str, Any] = {}
         for row in rows:
             for key, value in row.options.items():
@@ -172,12 +169,10 @@ class TagList:
         columns = dataclasses.replace(columns, time=said.pop("time", options.columns.time))
         options = dataclasses.replace(options, columns=columns, **said)
         units = {row.loop: row.unit for row in rows if row.loop and row.unit is not None}
-        tags = self
-        if rows:
-            tags = TagList({**self.loops, **_by_tag(rows)}, self.units, own=own)
-        return FileWay(options, tags if tags.loops or tags.units else None, units)
+        tags = {**self.loops, **_by_tag(rows)}
+        return FileWay(options, tags if tags or self.units else None, own, units, self.units)
 
-    def rows_of(self, path: Path) -> list[TagRow]:
+    def _rows_of(self, path: Path) -> list[TagRow]:
         """Return the rows that count for one file alone."""
         return [row for row in self.rows.get(path.name, ()) if row.names(path)]
 
@@ -185,7 +180,7 @@ class TagList:
         """Raise an :class:`InputError` where a row names several files."""
         taken: dict[str, Path] = {}
         for file in files:
-            for row in self.rows_of(file):
+            for row in self._rows_of(file):
                 if taken.setdefault(row.where, file) != file:
                     raise InputError(
                         f"{row.file} may be {taken[row.where]} or {file}",
@@ -195,7 +190,7 @@ class TagList:
 
     def strange(self, files: Sequence[Path]) -> list[str]:
         """Return the files of rows that are none of ``files``."""
-        there = {row.file for file in files for row in self.rows_of(file)}
+        there = {row.file for file in files for row in self._rows_of(file)}
         named = dict.fromkeys(row.file for rows in self.rows.values() for row in rows)
         return [file for file in named if file not in there]
 
