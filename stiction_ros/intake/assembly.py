@@ -19,7 +19,7 @@ from stiction_ros.intake.reported import at_pv, is_reported, on_grid
 from stiction_ros.intake.tables.block import Block, joined
 from stiction_ros.records.parts import ALIKE
 from stiction_ros.records.record import Record
-from stiction_ros.records.whole import Source, Whole
+from stiction_ros.records.whole import Whole
 from stiction_ros.texts import plural
 
 
@@ -98,12 +98,11 @@ def _refuse_incomplete(found: Found) -> None:
 def _records(
     run: Block, found: Found, options: IntakeOptions, rules: repairs.Rules
 ) -> tuple[Record, ...]:
-    source = Source(found.record, str(run.path), run.place)
     told, wanted = len(rules.told), options.sample_time
     own = at_pv(run, rules) if is_reported(run) else run
     if own is not None:
         try:
-            kept = _whole(repairs.filled(own, rules)).records(source)
+            kept = _whole(repairs.filled(own, rules), found.record).records()
             if wanted is None or all(abs(r.sample_time / wanted - 1.0) <= ALIKE for r in kept):
                 return kept
         except InputError:
@@ -114,14 +113,13 @@ def _records(
     parts: list[Record] = []
     stretches = on_grid(run, wanted, rules)
     for stretch in stretches:
-        source = Source(found.record, str(run.path), stretch.place)
-        parts += _whole(repairs.filled(stretch, rules)).records(source)
+        parts += _whole(repairs.filled(stretch, rules), found.record).records()
     if len(stretches) > 1:
         rules.told.append(f"cut at {len(stretches) - 1} gaps without a report")
     return tuple(parts)
 
 
-def _whole(block: Block) -> Whole:
+def _whole(block: Block, name: str) -> Whole:
     valves, outputs = (tuple(key.tag for key in block.of(signal)) for signal in ("op", "pv"))
 
     def side_by_side(signal: str, tags: Sequence[str]) -> FloatArray | None:
@@ -132,6 +130,9 @@ def _whole(block: Block) -> Whole:
     if op is None or pv is None:
         raise InputError("has no OP or no PV left")
     return Whole(
+        name=name,
+        where=str(block.path),
+        place=block.place,
         valves=valves,
         outputs=outputs,
         time=block.time - block.time[0],

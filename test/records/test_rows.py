@@ -6,12 +6,14 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stiction_ros.records.record import Record
-from stiction_ros.records.whole import Source, Whole
+from stiction_ros.records.whole import Whole
 
 
 def read(times: np.ndarray, op: np.ndarray, pv: np.ndarray) -> Record:
-    whole = Whole(("V",), ("P",), times, 0.0, op[:, None], pv[:, None], None, None)
-    (record,) = whole.records(Source("loop", "loop.csv", lambda row: f"row {row}"))
+    said = "loop", "loop.csv", lambda row: f"row {row}"
+    (record,) = Whole(
+        *said, ("V",), ("P",), times, 0.0, op[:, None], pv[:, None], None, None
+    ).records()
     return record
 
 

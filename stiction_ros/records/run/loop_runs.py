@@ -14,7 +14,7 @@ from stiction_ros.records.bag.messages import BagMessage, MessageDecoder, Wanted
 from stiction_ros.records.record import Quality, Record
 from stiction_ros.records.run.bag_runs import run_of, tell_runs
 from stiction_ros.records.run.loop_signals import Given, LoopSignals, is_signal
-from stiction_ros.records.whole import Source, Whole
+from stiction_ros.records.whole import Whole
 
 Samples = dict[int, tuple[float, ...]]  # stamp in ns to the value of each tag
 MOST_HELD = 0.01  # share of the samples at which a missing stem is held
@@ -34,7 +34,7 @@ class LoopRun:
 
 
 def loop_runs(
-    signals: LoopSignals, source: Source, namespace: str | None, notes: Sequence[str]
+    signals: LoopSignals, namespace: str | None, notes: Sequence[str]
 ) -> tuple[LoopRun, ...]:
     """Join what was collected of a loop to its runs, at least one, in the order of their begin.
 
@@ -56,7 +56,7 @@ def loop_runs(
             fix = "record it again with definitions in ros2msg, as `ros2 bag record -s mcap` does"
             raise InputError(what, where=error.where, fix=fix) from None
         raise
-    loop = _Loop(signals, space, source)
+    loop = _Loop(signals, space)
     said = [*notes, *loop.notes]
     found: list[LoopRun] = []
     refused: list[InputError] = []
@@ -81,8 +81,8 @@ def loop_runs(
 class _Loop:
     """The signals of one loop, by run and stamp."""
 
-    def __init__(self, signals: LoopSignals, space: str, source: Source) -> None:
-        self._source = source
+    def __init__(self, signals: LoopSignals, space: str) -> None:
+        self._where = signals.where
         given_op = signals.op(space)
         self.outputs, self.valves = signals.tags(space, "pv"), signals.tags(space, given_op)
         widths = {"pv": self.outputs, "sp": self.outputs, "op": self.valves}
@@ -94,7 +94,7 @@ class _Loop:
             tags = self.outputs if not pv else self.valves
             raise InputError(
                 f"holds no usable message of {what}",
-                where=source.where,
+                where=self._where,
                 fix=signals.skipped(space, what, tags),
             )
         told = tell_runs([g.stamp for g in pv], [g.number for g in pv])
@@ -123,6 +123,9 @@ class _Loop:
         stamps = np.array(sorted(pv.keys() & op.keys()), dtype=np.int64)
         first = int(stamps[0]) if len(stamps) else 0
         whole = Whole(
+            name=Path(self._where).name,
+            where=self._where,
+            place=lambda row: f"sample {row} of pv and op",
             valves=self.valves,
             outputs=self.outputs,
             time=(stamps - first) / 1e9,
@@ -131,8 +134,9 @@ class _Loop:
             pv=_at(stamps, pv, len(self.outputs)),
             sp=self._held(number, stamps, said),
             stem=self._stem(number, stamps, said),
+            cut_holes=True,
         )
-        parts = whole.records(self._source, said)
+        parts = whole.records(said)
         begin = first + round(parts[0].start * 1e9)
         parts = tuple(_with_known(part, first, pv=pv, op=op) for part in parts)
         moved = tuple(dataclasses.replace(p, start=first / 1e9 + p.start) for p in parts)
@@ -230,7 +234,6 @@ def _with_known(record: Record, first: int, **known: Samples) -> Record:
 class BagLoops:
     """What a bag holds, of all its loops."""
 
-    path: str | Path
     signals: LoopSignals
     # other messages that were wanted, with numbers between those of the signals around them
     others: Sequence[tuple[float, BagMessage]]
@@ -257,11 +260,11 @@ class BagLoops:
                 messages.append((count - 0.5, message))
         notes += decoder.notes
         seconds = (max(sent, default=0) - min(sent, default=0)) / 1e9
-        return cls(path, signals, messages, recorded, seconds, notes)
+        return cls(signals, messages, recorded, seconds, notes)
 
     def runs(self, namespace: str | None) -> tuple[LoopRun, ...]:
         """Return the runs of a loop by :func:`loop_runs`."""
-        return loop_runs(self.signals, bag_source(self.path), namespace, self.notes)
+        return loop_runs(self.signals, namespace, self.notes)
 
     def parts(self, namespace: str | None) -> tuple[Record, ...]:
         """Return the records of a loop."""
@@ -291,10 +294,3 @@ def read_bag_loops(path: str | Path) -> dict[str, tuple[Record, ...] | InputErro
         except InputError as error:
             found[space] = error
     return found
-
-
-def bag_source(path: str | Path) -> Source:
-    """Return how errors and records name a bag."""
-    return Source(
-        Path(path).name, str(path), lambda row: f"sample {row} of pv and op", cut_holes=True
-    )

@@ -26,10 +26,10 @@ def is_signal(topic: BagTopic) -> bool:
 
 
 class LoopSignals:
-    """The signals of every loop in a bag, in the order of the log."""
+    """The signals of every loop in the bag ``where``, in the order of the log."""
 
     def __init__(self, where: str) -> None:
-        self._where = where
+        self.where = where
         # number, stamp and value by tag of each usable message, by namespace and signal
         self._usable: dict[tuple[str, str], list[tuple[int, int, dict[str, float]]]] = {}
         self._bad: dict[tuple[str, str], Counter[str]] = {}
@@ -43,7 +43,7 @@ class LoopSignals:
         except (AttributeError, TypeError):
             raise InputError(
                 f"the definition of {message.topic} is not that of {message.type}",
-                where=self._where,
+                where=self.where,
                 fix="record it again with the one that ROS has",
             ) from None
         usable = self._usable.setdefault(key, [])
@@ -105,7 +105,7 @@ class LoopSignals:
         if len(loops) > 1:
             raise InputError(
                 f"holds {len(loops)} loops ({', '.join(space or '/' for space in sorted(loops))})",
-                where=self._where,
+                where=self.where,
                 fix="choose one with --namespace",
             )
         return loops[0]
@@ -115,7 +115,7 @@ class LoopSignals:
         if namespace is not None and loops:
             return InputError(
                 f"holds no loop in the namespace {namespace}",
-                where=self._where,
+                where=self.where,
                 fix=f"its loops are {', '.join(loops)}",
             )
         signals = {signal for _, signal in self._usable}
@@ -130,7 +130,7 @@ class LoopSignals:
         what = f"no topic {' and no topic '.join(lacks)} of {JOINT_STATE}"
         if not lacks:
             what = f"pv and op of {JOINT_STATE}, but never in one namespace"
-        return InputError(f"holds {what}", where=self._where, fix="record pv and op of a loop")
+        return InputError(f"holds {what}", where=self.where, fix="record pv and op of a loop")
 
 
 def _wrong(names: list[str], values: list[float]) -> str:
