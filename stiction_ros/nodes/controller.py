@@ -202,33 +202,20 @@ class ControllerNode(ManagedNode):
 
     def _work(self, samples: tuple[Sample, ...]) -> None:
         for sample in samples:
-            self._tell_what_was_given(sample)
-            if sample.answered:
-                self._answer(sample)
-            else:
-                self.live.pass_over(sample.pv, sample.dv)
+            if sample.begins:
+                self.log.info(f"sample {sample.number}: a run begins")
+                if sample.given.op is None:
+                    shown = ", ".join(f"{value:g}" for value in self.live.own_op)
+                    self.log.warning(f"nobody tells the op in force, taken to be {shown}")
+            coming, ahead = self.port.preview, None
+            if coming is not None:
+                horizon = self.settings.horizon
+                ahead = coming.ahead(sample.sp, sample.stamp, self._step, horizon)
+            result = self.live.take(sample, ahead)
+            if result is not None:
+                self._answer(sample.stamp, result)
 
-    def _tell_what_was_given(self, sample: Sample) -> None:
-        given, own = sample.given, None if self._result is None else self._result.op
-        if sample.begins:
-            in_force = given.op
-            if in_force is None:
-                in_force = self.model.stem_start if own is None else own
-                shown = ", ".join(f"{value:g}" for value in in_force)
-                self.log.warning(f"nobody tells the op in force, taken to be {shown}")
-            self.live.begin(in_force)
-            self.log.info(f"sample {sample.number}: a run begins")
-        elif given.op is not None:
-            self.live.applied(given.op, ours=given.ours)
-        elif not given.known and own is not None:
-            self.live.applied(own, known=False)
-
-    def _answer(self, sample: Sample) -> None:
-        stamp, coming = sample.stamp, self.port.preview
-        ahead = None
-        if coming is not None:
-            ahead = coming.ahead(sample.sp, stamp, self._step, self.settings.horizon)
-        result = self.live.step(sample.pv, sample.sp, sample.dv, ahead)
+    def _answer(self, stamp: int, result: StepResult) -> None:
         self.stamp = stamp
         self._last_op = joint_state(stamp, self.model.valve_names, result.op)
         self._last_op.header.frame_id = self.get_fully_qualified_name()

@@ -1,43 +1,36 @@
 """The estimator: pv and op in, friction and loop model out."""
 
 import time
-from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
-import numpy as np
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from stiction_ros.config_files import find_config
-from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
-from stiction_ros.identification import Identification
 from stiction_ros.loop import LoopModel
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
-from stiction_ros.nodes.shared.messages import SECOND, friction_message, to_ns, values_of
+from stiction_ros.nodes.shared.messages import friction_message, to_ns
 from stiction_ros.nodes.shared.peers import PLANTS
-from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
+from stiction_ros.online.estimator.live import FitUpdate
 from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.online.health import stopped_after
+from stiction_ros.online.input.port_health import Notice
+from stiction_ros.online.loop_estimator import Fit, Keys, LoopEstimator, Told
 from stiction_ros.online.monitor.gap_finding import GapFinding
-from stiction_ros.online.monitor.gap_monitor import GapLook
 from stiction_ros.online.monitor.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
-from stiction_ros.online.pairing import NEW_RUN, PairedSample
-from stiction_ros.texts import json_text
 
 COUNTED = ("bridged", "repeated", "stale", "future")
 SHOWN_AGAIN = 3.0  # s: a plant in lockstep shows its sample each second
 FIGURES = ("gap", "baseline", "growth", "limit", "free_run_rmse", "noise_floor")  # of an output
-Keys = list[tuple[str, object]]
 
 
 class EstimatorNode(ManagedNode):
-    """Thin shell around :class:`stiction_ros.online.estimator.live.LiveEstimator`."""
+    """Thin shell around :class:`stiction_ros.online.loop_estimator.LoopEstimator`."""
 
     settings: EstimatorNodeSettings
 
@@ -46,31 +39,18 @@ class EstimatorNode(ManagedNode):
         self._worker: FitWorker | None = None
 
     def configure(self) -> None:
-        self.settings.options()  # refuses what no fit can use
         name = self.settings.monitor_model
         self._watched = LoopModel.load(find_config(name)) if name else None
-        self._forget_loop()
-        self._refused: Counter[str] = Counter()
+        self.estimator = LoopEstimator(self.settings, self._watched, self._queue)
         self._heard = dict.fromkeys(("pv", "op"), time.monotonic())
-        self._sample = 0
-        self._token = ""
         self._fits = self._failed = 0
         self._said = "no fit yet"
         self._worker = FitWorker(self.settings.methods)
         self._done = self.create_guard_condition(self._collect)
         self._stiction = self.outlet(JointState, "stiction", SIGNAL_QOS, ("controller",))
         self._model = self.outlet(String, "loop_model", LATCHED_QOS, ("controller",))
-        self.inlet(JointState, "op_applied", partial(self._on_op, applied=True), READER_QOS)
-        self.inlet(JointState, "op", self._on_op, READER_QOS, ("controller",))
-        self.inlet(JointState, "pv", self._on_pv, READER_QOS, PLANTS)
-
-    def _forget_loop(self) -> None:
-        self.live: LiveEstimator | None = None
-        self._valves: tuple[str, ...] = ()
-        self._outputs: tuple[str, ...] = ()
-        self._pairs = self.settings.pairing()
-        self._pending: deque[tuple[int, Future[Identification]]] = deque()
-        self._strange: Counter[tuple[str, ...]] = Counter()
+        for topic, writers in (("op_applied", ()), ("op", ("controller",)), ("pv", PLANTS)):
+            self.inlet(JointState, topic, partial(self._take, topic), READER_QOS, writers)
 
     def linked(self) -> None:
         self._heard = dict.fromkeys(self._heard, time.monotonic())
@@ -86,27 +66,25 @@ class EstimatorNode(ManagedNode):
         return str(self.settings.loop)
 
     def retune(self, settings: EstimatorNodeSettings) -> None:
-        settings.options()
-        self._pairs.retune(*settings.bridges())
-        if self.live is not None:
-            self.live.retune(settings)
-            self.monitoring.retune(settings)
+        self.estimator.retune(settings)
 
     def tasks(self) -> list[tuple[str, str, str, list[tuple[str, object]]]]:
-        if self.live is None or not self.settings.monitor:
+        monitoring = self.estimator.monitoring
+        if monitoring is None or not self.settings.monitor:
             return []
-        return [monitor_status(self.monitoring, self._pairs.stamp_of)]
+        return [monitor_status(monitoring, self.estimator.pairs.stamp_of)]
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
-        counts, now = self._pairs.counts, time.monotonic()
-        keys: list[tuple[str, object]] = [("sample", self._sample), ("fits", self._fits)]
-        keys += [("failed_fits", self._failed), ("running_fits", len(self._pending))]
+        estimator, now = self.estimator, time.monotonic()
+        counts = estimator.pairs.counts
+        keys: list[tuple[str, object]] = [("sample", estimator.samples), ("fits", self._fits)]
+        keys += [("failed_fits", self._failed), ("running_fits", estimator.running)]
         keys += [(f"age_{name}", f"{now - heard:.3f}") for name, heard in self._heard.items()]
-        keys += [("behind", self._pairs.behind)]
+        keys += [("behind", estimator.pairs.behind)]
         keys += [("missed_samples", counts["missed"] + counts["bad"])]
         keys += [(f"{name}_samples", counts[name]) for name in COUNTED]
         keys += [("new_runs", counts["runs"])]
-        keys += [(f"refused_{name}", count) for name, count in self._refused.items()]
+        keys += [(f"refused_{name}", count) for name, count in estimator.refused.items()]
         return "ok", self._said, keys
 
     def look(self) -> None:
@@ -134,63 +112,12 @@ class EstimatorNode(ManagedNode):
             self._worker = None
             self._collect()
 
-    # ---- samples in ------------------------------------------------------------------------
+    # ---- samples in, fits out ----------------------------------------------------------------
 
-    def _on_pv(self, message: JointState) -> None:
-        pv = self._values("pv", message, self._outputs)
-        if pv is not None:
-            self._outputs = self._outputs or tuple(message.name)
-            self._take(self._pairs.add_pv(to_ns(message.header.stamp), pv))
-
-    def _on_op(self, message: JointState, *, applied: bool = False) -> None:
-        op = self._values("op", message, self._valves)
-        if op is not None:
-            self._valves = self._valves or tuple(message.name)
-            add = self._pairs.add_applied if applied else self._pairs.add_op
-            self._take(add(to_ns(message.header.stamp), op))
-
-    def _values(self, topic: str, message: JointState, names: tuple[str, ...]) -> FloatArray | None:
-        """Return the values of ``names``; None, and counted, where a message lacks one.
-
-        The first message tells the tags. When many in succession have others, the first was
-        a stray, or the loop is another one: all begins anew.
-        """
-        self._heard[topic] = time.monotonic()
-        given = tuple(message.name)
-        values = values_of(message, names or given) if given else None
-        if values is not None:
-            self._strange = Counter({k: n for k, n in self._strange.items() if k[0] != topic})
-            return values
-        self._refused[topic] += 1
-        self.notice(f"tags of {topic}", "warn", f"{topic} without a value for each tag is left out")
-        if given and len(given) == len(message.position):
-            self._strange[topic, *given] += 1
-        if self._strange[topic, *given] >= NEW_RUN:
-            self.log.warning(f"{topic} has other tags now: all begins anew")
-            self._forget_loop()
-        return None
-
-    def _take(self, samples: list[PairedSample]) -> None:
-        for found in samples:
-            if self.live is None:
-                settings = self.settings
-                names = (settings.loop, self._valves, self._outputs)
-                self.live = LiveEstimator(settings, *names, settings.sample_time)
-                self.monitoring = Monitoring(settings, self.live, self._watched, self._queue)
-            if found.begins:
-                self.log.info(f"a new run begins at stamp {found.stamp} ns")
-            if found.missed or found.begins:
-                self._skip(found)
-            elif not np.isfinite(found.pv).all():
-                self.notice("missed", "warn", f"bad samples from {found.sample} on, window anew")
-            self.stamp, self._sample = found.stamp, found.sample + 1
-            record = self.live.add(found.sample, found.op, found.pv)
-            if record is not None:
-                future = self._queue(fit, record, self.live.options())
-                self._pending.append((found.sample, future))
-            look = self.monitoring.add(found.sample, found.op, found.pv)
-            if look is not None:
-                self.report([look_status(look, self._pairs.stamp_of)])
+    def _take(self, topic: str, message: JointState) -> None:
+        self._heard[topic.removesuffix("_applied")] = time.monotonic()
+        stamp = to_ns(message.header.stamp)
+        self._tell(self.estimator.take(topic, stamp, message.name, message.position))
 
     def _queue(self, work: Any, *arguments: Any) -> Future[Any]:
         """Run ``work`` in the worker behind what is queued there; cancelled once that has ended."""
@@ -202,85 +129,38 @@ class EstimatorNode(ManagedNode):
         future.add_done_callback(lambda _future: self._done.trigger())
         return future
 
-    def _skip(self, found: PairedSample) -> None:
-        """Pass over samples that never came: no window may hold them."""
-        assert self.live is not None
-        self.live.restart()
-        self.monitoring.restart()
-        if found.missed:
-            text = f"{found.missed} samples missed before sample {found.sample}, window anew"
-            self.notice("missed", "warn", text)
-        for sample in range(found.sample - found.missed, found.sample):
-            if self.settings.due(sample):
-                self._stiction.publish(
-                    friction_message(self._pairs.stamp_of(sample), self._token, {})
-                )
-
-    # ---- fits out --------------------------------------------------------------------------
-
     def _collect(self) -> None:
-        """Publish every fit that is done, in order, and what the monitor has found."""
-        while self._pending and self._pending[0][1].done():
-            end, future = self._pending.popleft()
-            if future.cancelled() or self.live is None:
-                if self.live is not None:
-                    self.live.drop(end)
+        self._tell(self.estimator.collect())
+
+    def _tell(self, told: list[Told]) -> None:
+        """Publish what the estimator tells, in its order."""
+        self.stamp = self.estimator.stamp
+        for one in told:
+            if isinstance(one, Notice):
+                self.notice(*one)
                 continue
-            stamp = self._pairs.stamp_of(end)
-            try:
-                update = self.live.conclude(end, future.result())
-                self.monitoring.learn(update)
-            except Exception as error:  # one fit that fails must not end the estimator
-                self._failed += 1
-                self.live.drop(end)
-                self._said = f"window not usable: {error}"
-                if not isinstance(error, InputError):
-                    self._said = f"fit failed: {error!r}"
-                    self.log.error(self._said)
-                self._stiction.publish(friction_message(stamp, self._token, {}))
-                continue
-            self._fits += 1
-            self._announce(stamp, update)
-        for finding in () if self.live is None else self.monitoring.collect():
-            self.log.warning(f"window to sample {finding.end}: {finding.text}")
-            self.report([finding_status(finding, self._pairs.stamp_of)])
-
-    def _announce(self, stamp: int, update: FitUpdate) -> None:
-        if update.loop_model is not None:
-            valid_from = stamp + self.settings.fit_latency * round(
-                self.settings.sample_time * SECOND
-            )
-            self._token = str(valid_from)
-            text = update.loop_model.to_yaml(valid_from=valid_from)
-            self._model.publish(String(data=text))
-        self._stiction.publish(friction_message(stamp, self._token, update.identification.rows))
-        self._said = f"last window: {verdicts_of(update)}"
-        self.log.info(f"window to sample {update.end}: {figures_of(update)}")
-        self.report([fit_status(stamp, update)])
-
-
-def fit_status(stamp: int, update: FitUpdate) -> tuple[str, str, Keys]:
-    """Return task, message and key-values of one fit, which is told once."""
-    keys: Keys = [("window_end", stamp)]
-    for name, friction in update.trusted.items():
-        keys.append((f"{name}.trusted_law", friction.law))
-        keys += [(f"{name}.trusted_{key}", value) for key, value in friction.figures().items()]
-    keys.append(("identification", json_text(update.identification.to_dict(), indent=None)))
-    return "fit", verdicts_of(update), keys
-
-
-def verdicts_of(update: FitUpdate) -> str:
-    """Return the verdicts of one fit in one line."""
-    return ", ".join(f"{v.name} {v.verdict}" for v in update.identification.valves)
+            if isinstance(one, Fit):
+                if one.model_text:
+                    self._model.publish(String(data=one.model_text))
+                self._stiction.publish(friction_message(one.stamp, one.token, one.rows))
+                if one.update is None:
+                    self._failed += one.error is not None
+                    self._said = one.failure
+                    continue
+                self._fits += 1
+                self._said = f"last window: {one.verdicts}"
+                self.log.info(f"window to sample {one.end}: {figures_of(one.update)}")
+            elif isinstance(one, GapFinding):
+                self.log.warning(f"window to sample {one.end}: {one.text}")
+            self.report([self.estimator.status_of(one)])
 
 
 def figures_of(update: FitUpdate) -> str:
     """Return verdicts and frictions of one fit in one line, % of travel."""
-    frictions = [
-        f"{v.name}.f_s {v.static_friction:.3g}, {v.name}.f_d {v.dynamic_friction:.3g}"
+    return ", ".join(
+        f"{v.name} {v.verdict}, f_s {v.static_friction:.3g}, f_d {v.dynamic_friction:.3g}"
         for v in update.identification.valves
-    ]
-    return f"{verdicts_of(update)}; {', '.join(frictions)}"
+    )
 
 
 def monitor_status(
@@ -312,15 +192,3 @@ def monitor_status(
         ]
     troubled = look is not None and (look.grown or bool(look.failure))
     return "warn" if troubled else "ok", "monitor", monitoring.text, keys
-
-
-def look_status(look: GapLook, stamp_of: Callable[[int], int]) -> tuple[str, str, Keys]:
-    """Return task, message and key-values of one measurement, which is told once."""
-    keys: Keys = [("window_end", stamp_of(look.end))]
-    return "gap", look.text, [*keys, ("look", json_text(look.to_dict(), indent=None))]
-
-
-def finding_status(found: GapFinding, stamp_of: Callable[[int], int]) -> tuple[str, str, Keys]:
-    """Return task, message and key-values of what was found, which is told once."""
-    keys: Keys = [("window_begin", stamp_of(found.begin)), ("window_end", stamp_of(found.end))]
-    return "finding", found.text, [*keys, ("finding", json_text(found.to_dict(), indent=None))]

@@ -29,19 +29,20 @@ from stiction_ros.loop.yaml_reading import Section, load_yaml
 from stiction_ros.online.controller.live import ModeChange
 from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.controller.testing import ValveTestingController
-from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
+from stiction_ros.online.estimator.live import FitUpdate
 from stiction_ros.online.input.signal_check import SignalCheck
+from stiction_ros.online.loop_estimator import Fit, LoopEstimator, Told
 from stiction_ros.online.monitor.gap_finding import GapFinding
 from stiction_ros.online.monitor.gap_monitor import GapLook
-from stiction_ros.online.monitor.monitoring import Monitoring, check_model
+from stiction_ros.online.monitor.monitoring import check_model
 from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
+from stiction_ros.online.pairing import PairedSample
 from stiction_ros.online.plain_settings import (
     FitSchedule,
     NodeSettings,
     PlantNodeSettings,
     RecorderNodeSettings,
 )
-from stiction_ros.records import Record
 from stiction_ros.settings import from_mapping as settings_from_mapping
 
 NODE_SETTINGS: Mapping[str, type[NodeSettings]] = {
@@ -293,14 +294,14 @@ class LoopSession:
     def __init__(self, scenario: Scenario, plant: LoopModel, identify: bool) -> None:
         self.controller = ValveTestingController(scenario.controller, scenario.process)
         self._check = SignalCheck(scenario.process.instruments)
-        self.estimator: LiveEstimator | None = None
+        self.estimator: LoopEstimator | None = None
         if identify:
-            self.estimator = LiveEstimator(
-                scenario.estimator, plant.name, plant.valve_names, plant.outputs, plant.sample_time
+            settings = dataclasses.replace(
+                scenario.estimator, loop=plant.name, sample_time=plant.sample_time
             )
-        self.monitoring: Monitoring | None = None
-        if self.estimator is not None and scenario.estimator.monitor:
-            self.monitoring = Monitoring(scenario.estimator, self.estimator, scenario.monitor_model)
+            self.estimator = LoopEstimator(settings, scenario.monitor_model)
+            self.estimator.pairs.origin = 0
+            self.estimator.tags = {"pv": plant.outputs, "op": plant.valve_names}
         self.looks: list[GapLook] = []
         self.findings: list[GapFinding] = []
         self.fits: list[FitUpdate] = []
@@ -313,28 +314,24 @@ class LoopSession:
         result = self.controller.step(pv, sp, measurement.dv)
         self.stems.append(self.controller.observed.stem)
         if self.estimator is not None:
-            record = self.estimator.add(self._sample, result.op, measurement.pv)
-            if record is not None:
-                self._fit(self.estimator, record)
-        if self.monitoring is not None:
-            look = self.monitoring.add(self._sample, result.op, measurement.pv)
-            self.looks += [] if look is None else [look]
-            self.findings += self.monitoring.collect()
+            stamp = self.estimator.pairs.stamp_of(self._sample)
+            found = PairedSample(self._sample, stamp, result.op, measurement.pv)
+            for told in self.estimator.add(found):
+                self._learn(told)
         self._sample += 1
         return result.op
 
-    def _fit(self, estimator: LiveEstimator, record: Record) -> None:
-        try:
-            found = fit(record, estimator.options())
-        except InputError:
-            estimator.drop(self._sample)
-            return  # a window that cannot be used changes nothing, as in the node
-        update = estimator.conclude(self._sample, found)
-        self.fits.append(update)
-        if self.monitoring is not None:
-            self.monitoring.learn(update)
-        if update.loop_model is not None:
-            self.controller.offer(update.loop_model, self._sample + self._latency)
+    def _learn(self, told: Told) -> None:
+        if isinstance(told, GapLook):
+            self.looks.append(told)
+        elif isinstance(told, GapFinding):
+            self.findings.append(told)
+        elif isinstance(told, Fit) and told.update is not None:
+            self.fits.append(told.update)
+            if told.update.loop_model is not None:
+                self.controller.offer(told.update.loop_model, self._sample + self._latency)
+        elif isinstance(told, Fit) and told.error and not isinstance(told.error, InputError):
+            raise told.error  # a window that cannot be used changes nothing
 
     def told(self, run: ClosedLoopRun) -> LiveRun:
         """Return what has happened so far, with the signals of ``run``."""

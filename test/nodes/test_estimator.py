@@ -68,7 +68,7 @@ class Loop:
             self.applied.publish(joint_state(second * SECOND, ["V1"], [50.0]))
 
     def until(self, sample: int) -> None:
-        self.graph.spin_until(lambda: self.node._sample == sample, f"sample {sample}")
+        self.graph.spin_until(lambda: self.node.estimator.samples == sample, f"sample {sample}")
 
     def says(self, level: bytes, text: str) -> None:
         def said() -> bool:
@@ -81,8 +81,8 @@ def test_a_few_missed_samples_are_bridged_and_counted(graph: Graph) -> None:
     loop = Loop(graph)
     loop.show([1, 2, 3, 6, 7])
     loop.until(7)
-    assert loop.node._pairs.counts["bridged"] == 2
-    assert len(loop.node.live._pv) == 7
+    assert loop.node.estimator.pairs.counts["bridged"] == 2
+    assert len(loop.node.estimator.live._pv) == 7
 
 
 @pytest.mark.parametrize("how", ["lost", "nan"])
@@ -93,7 +93,7 @@ def test_many_missed_samples_begin_the_window_anew(graph: Graph, how: str) -> No
         loop.show(range(4, 10), float("nan"))
     loop.show([10, 11])
     loop.until(11)
-    assert len(loop.node.live._pv) == 2
+    assert len(loop.node.estimator.live._pv) == 2
     loop.says(b"\x01", "window anew")
     graph.spin_until(lambda: loop.told[-1][2]["missed_samples"] == "6", "the count")
 
@@ -104,11 +104,11 @@ def test_one_stale_or_future_stamp_does_nothing_and_ten_older_ones_are_a_new_run
     loop = Loop(graph)
     loop.show([1000, 1001, 1002, 5, 10**6, 1003])
     loop.until(4)
-    assert len(loop.node.live._pv) == 4
+    assert len(loop.node.estimator.live._pv) == 4
     loop.show(range(1, 13))
     loop.until(16)
-    assert len(loop.node.live._pv) == 12
-    assert loop.node._pairs.counts["runs"] == 1
+    assert len(loop.node.estimator.live._pv) == 12
+    assert loop.node.estimator.pairs.counts["runs"] == 1
 
 
 @pytest.mark.parametrize("topic", ["pv", "op_applied", "op"])
@@ -131,8 +131,10 @@ def test_a_stray_that_came_first_does_not_name_the_tags_for_ever(graph: Graph) -
     loop = Loop(graph)
     loop.pv.publish(joint_state(SECOND, ["OTHER"], [1.0]))
     loop.show(range(2, 30))
-    graph.spin_until(lambda: loop.node._outputs == ("PV1",), "the true tag")
-    graph.spin_until(lambda: loop.node.live and len(loop.node.live._pv) > 10, "samples")
+    graph.spin_until(lambda: loop.node.estimator.tags["pv"] == ("PV1",), "the true tag")
+    graph.spin_until(
+        lambda: loop.node.estimator.live and len(loop.node.estimator.live._pv) > 10, "samples"
+    )
 
 
 def test_a_loop_that_stops_is_an_error_until_it_goes_on(graph: Graph) -> None:
@@ -142,7 +144,7 @@ def test_a_loop_that_stops_is_an_error_until_it_goes_on(graph: Graph) -> None:
     shown = [2]
 
     def over() -> bool:
-        if loop.node._pairs._last >= shown[-1] * SECOND:
+        if loop.node.estimator.pairs._last >= shown[-1] * SECOND:
             shown.append(shown[-1] + 1)
             loop.show(shown[-1:])
         return loop.told[-1][0] == b"\x00"
@@ -167,5 +169,5 @@ def test_a_sample_that_is_shown_again_counts_once(graph: Graph) -> None:
     loop = Loop(graph, pace="lockstep")
     loop.show([1, 2, 2, 2, 3])
     loop.until(3)
-    assert loop.node._pairs.counts["repeated"] == 2
-    assert len(loop.node.live._pv) == 3
+    assert loop.node.estimator.pairs.counts["repeated"] == 2
+    assert len(loop.node.estimator.live._pv) == 3

@@ -43,12 +43,16 @@ class Feed:
         )
         graph.spin_until(lambda: self.estimator.running, "the start")
 
+    @property
+    def taken(self) -> int:
+        return int(self.estimator.estimator.samples)
+
     def show(self, first: int, last: int) -> None:
         for k in range(first, last):
             stamp = (k + 1) * SECOND
             self.pv.publish(joint_state(stamp, ["PV1"], SHIFTED.pv[k]))
             self.op.publish(joint_state(stamp, ["V1"], SHIFTED.op[k]))
-            self.graph.spin_until(lambda k=k: self.estimator._sample == k + 1, f"sample {k}")
+            self.graph.spin_until(lambda k=k: self.taken == k + 1, f"sample {k}")
 
 
 @pytest.fixture(scope="module")

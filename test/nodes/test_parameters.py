@@ -114,8 +114,8 @@ def built(graph: Graph, kind: str, values: Mapping[str, Any]) -> Any:
         node.start()
         graph.spin_until(lambda: node.running, f"{kind} to run")
     if kind == "estimator":
-        node._on_pv(joint_state(10**9, ["PV1"], [0.0]))
-        node._on_op(joint_state(10**9, ["V1"], [0.0]))
+        node._take("pv", joint_state(10**9, ["PV1"], [0.0]))
+        node._take("op", joint_state(10**9, ["V1"], [0.0]))
     assert not node.failure
     return node
 

@@ -16,6 +16,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.online.input.samples import picked
 from stiction_ros.records.storage.bag_metadata import INFINITE_NS, Qos
 
 if TYPE_CHECKING:  # nodes that control nothing load nothing of control
@@ -47,14 +48,7 @@ def joint_state(stamp: int, names: Sequence[str], values: Iterable[float]) -> Jo
 
 def values_of(message: JointState, names: Sequence[str]) -> FloatArray | None:
     """Return the values of ``names`` in their order, or None when one is not there."""
-    if len(message.position) != len(message.name):
-        return None
-    if message.name == list(names):
-        return np.array(message.position, dtype=float)
-    found = dict(zip(message.name, message.position, strict=True))
-    if any(name not in found for name in names):
-        return None
-    return np.array([found[name] for name in names], dtype=float)
+    return picked(message.name, message.position, names)
 
 
 def measured_of(message: JointState, names: Sequence[str]) -> FloatArray | None:

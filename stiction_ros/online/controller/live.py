@@ -18,6 +18,7 @@ from stiction_ros.online.handover.known_friction import alike, frictions_of
 from stiction_ros.online.handover.offers import Judge, last_samples
 from stiction_ros.online.handover.watch import Approach, Watch
 from stiction_ros.online.input.op_port import Given
+from stiction_ros.online.input.samples import Sample
 
 HISTORY_SAMPLES = 20_000
 FIRST_MOVE = 0.9  # %; largest move of the first OP after a start or a hold
@@ -72,6 +73,7 @@ class LiveController:
         self._latest: tuple[FloatArray, FloatArray, FloatArray] | None = None  # OP, PV, DV
         self._told: Given | None = None  # what the valves were given
         self._in_force, self._sure = np.array(model.stem_start), True
+        self.own_op = self._in_force  # of the last step
         self._first = True
         self._approach: Approach | None = None
         self._retuned: HandOver | None = None
@@ -139,6 +141,24 @@ class LiveController:
         as the plant's own controller: such a sample counts neither for nor against a swap.
         """
         self._told = Given(np.array(op, dtype=float), known, ours)
+
+    def take(self, sample: Sample, preview: FloatArray | None = None) -> StepResult | None:
+        """Do what a sample asks for; return the step where it is answered.
+
+        Where nobody tells what the valves were given, it is taken to be our own last OP.
+        """
+        given = sample.given
+        op = self.own_op if given.op is None else given.op
+        if sample.begins:
+            self.begin(op)
+        elif given.op is not None or not given.known:
+            self.applied(op, given.known, given.ours)
+        if not sample.answered:
+            self.pass_over(sample.pv, sample.dv)
+            return None
+        result = self.step(sample.pv, sample.sp, sample.dv, preview)
+        self.own_op = result.op
+        return result
 
     def offer(self, model: LoopModel, at: int) -> None:
         """Prepare a controller that knows the valves of ``model`` from sample ``at`` on.

@@ -1,7 +1,7 @@
 """Samples as a controller works through them, and the rules by which they come about."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -66,3 +66,19 @@ class PortState:
     waiting: int  # PVs that came while no run could begin
     lacks: str  # what a run lacks to begin: ``sp``, ``op_applied`` or nothing
     counts: Mapping[str, int]  # everything that was refused, late or missing, by reason
+
+
+def picked(tags: Sequence[str], values: Sequence[float], names: Sequence[str]) -> FloatArray | None:
+    """Return the values of ``names`` in their order, shape (len(names),).
+
+    None when one of them is not among the ``tags`` of a message, or the message has another number
+    of ``values`` than tags.
+    """
+    if len(tags) != len(values):
+        return None
+    if list(tags) == list(names):
+        return np.array(values, dtype=float)
+    found = dict(zip(tags, values, strict=True))
+    if any(name not in found for name in names):
+        return None
+    return np.array([found[name] for name in names], dtype=float)

@@ -1,25 +1,27 @@
 """What a replay needs of a bag: the signals in their order, the settings, what was published."""
 
 import dataclasses
+import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from stiction_ros.control import ControlMode
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.online.input.samples import picked
 from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.bag.run_metadata import mapping_of
 from stiction_ros.records.run import events
 from stiction_ros.records.run.bag_runs import tell_runs
 from stiction_ros.records.run.loop_signals import JOINT_STATE, LoopSignals
 from stiction_ros.records.storage.bag_metadata import BagTopic
+from stiction_ros.texts import finite
 
 PARAMETER_EVENT = "rcl_interfaces/msg/ParameterEvent"
 _INPUTS = ("pv", "op", "op_applied", "sp", "dv")
 _TEXTS = ("config", "loop_model")
+DOCUMENTS = ("identification", "look", "finding")
 _KIND_BY_PARAMETER = {"confirmations": "estimator", "horizon": "controller"}
 
 
@@ -38,21 +40,7 @@ class Signal:
 
     def of(self, names: Sequence[str]) -> FloatArray | None:
         """Return the values of ``names``, shape (len(names),); None when one is missing."""
-        if len(self.names) != len(self.values):
-            return None
-        found = dict(zip(self.names, self.values, strict=True))
-        if any(name not in found for name in names):
-            return None
-        return np.array([found[name] for name in names], dtype=float)
-
-
-@dataclasses.dataclass(frozen=True)
-class PublishedFit:
-    """One message of ``stiction``."""
-
-    # value, lower and upper end by ``V1.f_s``, %; empty for an unusable window
-    rows: Mapping[str, tuple[float, float, float]]
-    token: str  # ``valid_from`` of the loop model in force, as text
+        return picked(self.names, self.values, names)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,9 +71,10 @@ class ReplayBag:
     signals: tuple[Signal, ...]  # in the order of the bag
     estimator: NodeConfig | None  # estimator, controller: configurations, None when there is none
     controller: NodeConfig | None
-    published_fits: Mapping[int, PublishedFit]  # on ``stiction``, by the end of their window, ns
-    told_fits: Mapping[int, events.Fit]  # those in ``/diagnostics`` by the end of their window, ns
-    told_gaps: events.GapLog  # what the monitor told in ``/diagnostics``
+    # by the end of their windows, ns: what :func:`fit_told` returns of the messages of ``stiction``
+    fits: Mapping[int, dict[str, Any]]
+    # likewise the statuses in ``/diagnostics``, by the key of their document (:data:`DOCUMENTS`)
+    told: Mapping[str, Mapping[int, dict[str, Any]]]
     models: tuple[PublishedModel, ...]  # messages of ``loop_model`` in their order
     modes: tuple[events.ModeChange, ...]  # changes of mode in ``/diagnostics``, with the first mode
     # a stamp in ns and how many samples the estimator had taken in up to it; None when the bag does
@@ -107,21 +96,9 @@ def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> Replay
     notes: list[str] = []
     messages = list(read_messages(path, wanted=_wanted, notes=notes))
     space = _loop(messages, namespace, str(path))
-    inside = [m for m in messages if _node_or_topic_space(m) in (space, None)]
+    inside = events.of_loop(messages, space)
     configs = _configs(inside, space, notes)
-    # The diagnostics of a node name its loop as their hardware.
-    loops = {
-        str(config.parameters.get("loop") or (config.model or {}).get("loop", ""))
-        for config in configs.values()
-    }
-    known = {"", *loops}
-    diagnostics = [
-        m
-        for m in inside
-        if m.type == events.DIAGNOSTICS
-        and (not loops or any(str(s.hardware_id) in known for s in m.message.status))
-    ]
-    notes += _changed_parameters(inside, configs.values())
+    notes += _changed_parameters(messages, configs.values())
     signals = tuple(_signals(inside))
     stamps = [signal.stamp for signal in signals if signal.kind == "pv"]
     runs = tell_runs(stamps, range(len(stamps))).runs
@@ -133,12 +110,14 @@ def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> Replay
         signals=signals,
         estimator=configs.get("estimator"),
         controller=configs.get("controller"),
-        published_fits=dict(_published_fits(inside)),
-        told_fits={fit.stamp: fit for fit in events.fits(diagnostics)},
-        told_gaps=events.gap_log(diagnostics),
+        fits=dict(_fits(inside)),
+        told={
+            key: {end: read_status(keys) for end, keys, _ in events.documents(inside, key)}
+            for key in DOCUMENTS
+        },
         models=tuple(_models(inside)),
-        modes=events.mode_changes(diagnostics),
-        counted=_counted(diagnostics, configs.get("estimator")),
+        modes=events.mode_changes(inside),
+        counted=_counted(inside, configs.get("estimator")),
         notes=tuple(notes),
     )
 
@@ -168,14 +147,6 @@ def _loop(messages: Iterable[BagMessage], namespace: str | None, where: str) -> 
     return space
 
 
-def _node_or_topic_space(message: BagMessage) -> str | None:
-    """Return the namespace a message belongs to; None for the global topics."""
-    space, name = last_part(message.topic)
-    if message.type in (events.DIAGNOSTICS, PARAMETER_EVENT):
-        return None
-    return space.rpartition("/")[0] if name == "config" else space
-
-
 def _signals(messages: Iterable[BagMessage]) -> Iterator[Signal]:
     for message in messages:
         kind = last_part(message.topic)[1]
@@ -186,17 +157,35 @@ def _signals(messages: Iterable[BagMessage]) -> Iterator[Signal]:
             yield Signal(kind, stamp_ns(state), names, values, by)
 
 
-def _published_fits(messages: Iterable[BagMessage]) -> Iterator[tuple[int, PublishedFit]]:
+def _fits(messages: Iterable[BagMessage]) -> Iterator[tuple[int, dict[str, Any]]]:
     for message in events.on_topic(messages, JOINT_STATE, "stiction"):
         state = message.message
         if state.header.frame_id == ControlMode.VALVE_TEST:
             continue  # no fit
         columns = (state.name, state.position, state.velocity, state.effort)
-        rows = {
-            str(name): (float(value), float(low), float(high))
-            for name, value, low, high in zip(*columns, strict=False)
-        }
-        yield stamp_ns(state), PublishedFit(rows, str(state.header.frame_id))
+        rows = {str(name): [float(v) for v in row] for name, *row in zip(*columns, strict=False)}
+        yield stamp_ns(state), fit_told(rows, str(state.header.frame_id))
+
+
+def fit_told(rows: Mapping[str, Sequence[float]], token: str) -> dict[str, Any]:
+    """Return what ``stiction`` tells of a fit, as a document.
+
+    It holds value, lower and upper end by ``V1.f_s``, none for an unusable window, and ``token``,
+    which is ``valid_from`` of the loop model in force.
+    """
+    ends = ("value", "lower end", "upper end")
+    shown = {name: finite(dict(zip(ends, row, strict=True))) for name, row in rows.items()}
+    return {"names": ", ".join(shown), "stiction": shown, "model in force": token}
+
+
+def read_status(keys: Mapping[str, str]) -> dict[str, Any]:
+    """Return the keys and values of a status with its documents read, but for their wall time."""
+    read: dict[str, Any] = dict(keys)
+    for key in DOCUMENTS:
+        if key in read:
+            read[key] = json.loads(read[key])
+            read[key].pop("seconds", None)  # another each time
+    return read
 
 
 def _models(messages: Iterable[BagMessage]) -> Iterator[PublishedModel]:
@@ -252,11 +241,11 @@ def _changed_parameters(messages: Iterable[BagMessage], configs: Iterable[NodeCo
 
 
 def _counted(
-    diagnostics: Iterable[BagMessage], estimator: NodeConfig | None
+    messages: Iterable[BagMessage], estimator: NodeConfig | None
 ) -> tuple[int, int] | None:
     """Return a stamp and the estimator's count of samples at it."""
     name = "estimator" if estimator is None else estimator.node.strip("/")
-    for message in diagnostics:
+    for message in events.on_topic(messages, events.DIAGNOSTICS, "diagnostics"):
         for status in message.message.status:
             if status.name != f"{name}: status":
                 continue

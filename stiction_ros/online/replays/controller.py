@@ -14,11 +14,11 @@ from stiction_ros.online.input.op_port import Given
 from stiction_ros.online.input.port import LONGEST_GAP
 from stiction_ros.online.input.samples import Sample
 from stiction_ros.online.input.signal_check import SignalCheck
+from stiction_ros.online.loop_estimator import SECOND
 from stiction_ros.online.node_settings import ControllerNodeSettings
 from stiction_ros.online.replays.bag import ReplayBag
+from stiction_ros.online.replays.result import Comparison
 from stiction_ros.records.run.events import ModeChange, without_repeats
-
-SECOND = 10**9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,20 +30,11 @@ class Offer:
 
 
 @dataclasses.dataclass(frozen=True)
-class OpMatch:
-    """How many recorded and replayed ``op`` are there, how many equal, and the first others."""
-
-    compared: int = 0
-    equal: int = 0
-    first_difference: str = ""
-
-
-@dataclasses.dataclass(frozen=True)
 class ReplayedControl:
     """What the controller did in the replay."""
 
     changes: tuple[ModeChange, ...]  # modes in their order, the one at the start first
-    op: OpMatch  # comparison with the recorded ``op``
+    op: Comparison  # comparison with the recorded ``op``
     notes: tuple[str, ...]  # why it stopped or left something out
 
 
@@ -64,7 +55,7 @@ def replay_controller(
     step = round(model.sample_time * SECOND)
     notes: list[str] = []
     changes: list[ModeChange] = []
-    match = OpMatch()
+    replayed: dict[int, tuple[float, ...]] = {}
     first: int | None = None
     waiting = list(offers)
     for sample in _samples(bag, settings, model, notes):
@@ -74,22 +65,19 @@ def replay_controller(
         while waiting and waiting[0].sample <= now:
             _offer(live, waiting.pop(0), first, notes)
         told = len(live.changes) if changes else 0
-        if sample.begins and sample.given.op is not None:
-            live.begin(sample.given.op)
-        elif sample.given.op is not None:
-            live.applied(sample.given.op, ours=sample.given.ours)
-        if not sample.answered:
-            live.pass_over(sample.pv, sample.dv)
+        result = live.take(sample)
+        if result is None:
             continue
-        op = live.step(sample.pv, sample.sp, sample.dv).op
-        match = _compared(match, op, recorded.get(sample.stamp), (sample.stamp - origin) / SECOND)
+        replayed[sample.stamp] = tuple(result.op.tolist())
         frictions = dict(live.known_friction())
         for change in live.changes[told:]:
             stamp = origin + (first + change.sample) * step
             changes.append(
                 ModeChange(stamp, change.mode.value, change.model, change.reason, frictions)
             )
-    return ReplayedControl(without_repeats(changes), match, tuple(notes))
+    own = {stamp: tuple(op.tolist()) for stamp, op in recorded.items() if stamp in replayed}
+    op = Comparison.of(lambda at: f"op at {(at - origin) / SECOND:.9g} s", own, replayed)
+    return ReplayedControl(without_repeats(changes), op, tuple(notes))
 
 
 def _offer(live: LiveController, offer: Offer, first: int, notes: list[str]) -> None:
@@ -178,13 +166,3 @@ def _given(bag: ReplayBag, model: LoopModel) -> dict[int, Given]:
             if op is not None:
                 found[signal.stamp] = Given(op, ours=signal.by in own)
     return found
-
-
-def _compared(match: OpMatch, op: FloatArray, recorded: FloatArray | None, time: float) -> OpMatch:
-    if recorded is None:
-        return match
-    same = np.array_equal(op, recorded)
-    difference = match.first_difference
-    if not same and not difference:
-        difference = f"op at {time:.9g} s: recorded {recorded.tolist()}, replayed {op.tolist()}"
-    return OpMatch(match.compared + 1, match.equal + same, difference)

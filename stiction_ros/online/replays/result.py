@@ -2,12 +2,11 @@
 
 import dataclasses
 import enum
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from stiction_ros.online.loop_estimator import SECOND, Fit
 from stiction_ros.online.replays.bag import ReplayBag
-from stiction_ros.online.replays.controller import SECOND, OpMatch
-from stiction_ros.online.replays.estimator import ReplayedFit
 from stiction_ros.records.run.events import ModeChange, swap_of
 from stiction_ros.texts import finite
 
@@ -19,12 +18,41 @@ class Match(enum.StrEnum):
     DIFFERENT = "different"
     NOT_COMPARED = "not_compared"
 
+    @classmethod
+    def of(cls, difference: str) -> "Match":
+        """Return how two things compare of which this is the first difference."""
+        return cls.DIFFERENT if difference else cls.EQUAL
+
+
+@dataclasses.dataclass(frozen=True)
+class Comparison:
+    """How many recorded things were compared, how many came again, and the first that did not."""
+
+    compared: int = 0
+    equal: int = 0
+    first_difference: str = ""
+
+    @classmethod
+    def of(
+        cls, called: Callable[[int], str], recorded: Mapping[int, Any], replayed: Mapping[int, Any]
+    ) -> "Comparison":
+        """Compare all that was recorded, by stamp in ns; ``called`` names the one of a stamp."""
+        found = []
+        for stamp, was in recorded.items():
+            difference = "recorded, not replayed"
+            if stamp in replayed:
+                difference = first_difference(was, replayed[stamp])
+            if difference:
+                found.append(f"{called(stamp)}: {difference}")
+        return cls(len(recorded), len(recorded) - len(found), found[0] if found else "")
+
 
 @dataclasses.dataclass(frozen=True)
 class FitMatch:
     """One fit, replayed and recorded."""
 
-    fit: ReplayedFit  # of the replay
+    fit: Fit  # of the replay
+    whole: bool  # whether the bag holds the whole window; otherwise the recorded fit stands in
     match: Match  # equal in every bit, different, or not compared
     difference: str  # the first difference, or why it is not compared; empty when equal
 
@@ -67,7 +95,7 @@ class Replay:
     samples: int  # of the run up to the end of the bag
     fits: tuple[FitMatch, ...]  # every fit that was due within the bag
     modes: ModeMatch | None  # None when the bag has no configuration of a controller
-    op: OpMatch | None  # None likewise, and for a bag that begins later than the run
+    op: Comparison | None  # None likewise, and for a bag that begins later than the run
     notes: tuple[str, ...]  # what stands in the way of equality, one sentence each
     monitor: MonitorMatch | None = None  # None when the estimator ran without monitor
 
@@ -77,8 +105,7 @@ class Replay:
         for fit in self.fits:
             yield fit.match, f"fit at {self.seconds(fit.fit.stamp):.9g} s: {fit.difference}"
         if self.op is not None and self.op.compared:
-            said = self.op.first_difference
-            yield Match.DIFFERENT if said else Match.EQUAL, said
+            yield Match.of(self.op.first_difference), self.op.first_difference
         for one in (self.modes, self.monitor):
             if one is not None:
                 yield one.match, one.difference
@@ -124,7 +151,7 @@ class Replay:
             "time": self.seconds(match.fit.stamp),
             "match": match.match.value,
             "difference": match.difference,
-            "whole_window": match.fit.whole,
+            "whole_window": match.whole,
             "failure": match.fit.failure,
             "loop_model": bool(match.fit.model_text),
             "valves": [valve.to_dict() for valve in valves],
@@ -153,3 +180,22 @@ class Replay:
             "reason": change.reason,
             "friction": dict(change.frictions),
         }
+
+
+def first_difference(recorded: Any, found: Any, place: str = "") -> str:
+    """Return where two JSON documents differ first and how; empty when they are equal.
+
+    What the version that recorded did not know is no difference.
+    """
+    if isinstance(recorded, Mapping) and isinstance(found, Mapping):
+        pairs = [(str(key), was, found.get(key)) for key, was in recorded.items()]
+    elif isinstance(recorded, list) and isinstance(found, list) and len(recorded) == len(found):
+        pairs = [(str(k), *pair) for k, pair in enumerate(zip(recorded, found, strict=True))]
+    else:
+        said = "" if recorded == found else f"recorded {recorded!r}, replayed {found!r}"
+        return (f"{place}: {said}" if place and said else said)[:300]
+    for key, was, now in pairs:
+        difference = first_difference(was, now, f"{place}.{key}" if place else key)
+        if difference:
+            return difference
+    return ""

@@ -137,7 +137,7 @@ def without_repeats(changes: Iterable[ModeChange]) -> tuple[ModeChange, ...]:
 def fits(messages: Iterable[BagMessage]) -> tuple[Fit, ...]:
     """Return the fits that ``/diagnostics`` tells, by the end of their window."""
     found: dict[int, Fit] = {}
-    for end, values, identification in _documents(messages, "identification"):
+    for end, values, identification in documents(messages, "identification"):
         found[end] = Fit(end, identification, _frictions(values, ".trusted_"))
     return tuple(found[end] for end in sorted(found))
 
@@ -146,7 +146,7 @@ def gap_log(messages: Iterable[BagMessage]) -> GapLog:
     """Return what the diagnostics among ``messages`` tell of the monitor, in order of time."""
     told = list(messages)
     looks, findings = (
-        dict(sorted((end, document) for end, _, document in _documents(told, kind)))
+        dict(sorted((end, document) for end, _, document in documents(told, kind)))
         for kind in ("look", "finding")
     )
     return GapLog(looks, findings)
@@ -257,7 +257,7 @@ def _statuses(messages: Iterable[BagMessage]) -> Iterator[tuple[int, str, Mappin
             yield stamp_ns(message.message), node_of(status), values
 
 
-def _documents(
+def documents(
     messages: Iterable[BagMessage], key: str
 ) -> Iterator[tuple[int, Mapping[str, str], Mapping[str, Any]]]:
     """Yield the end of a window, all keys of its status, and the JSON that stands under one."""

@@ -8,8 +8,8 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.node_settings import ControllerNodeSettings
 from stiction_ros.online.replays.bag import ReplayBag, Signal
-from stiction_ros.online.replays.controller import OpMatch, replay_controller
-from stiction_ros.records.run.events import gap_log
+from stiction_ros.online.replays.controller import replay_controller
+from stiction_ros.online.replays.result import Comparison
 
 S = 10**9
 SAMPLES = 60
@@ -20,10 +20,7 @@ SETTINGS = {"fit_first": 10**6, "horizon": 30}
 
 
 def bag(signals: list[Signal]) -> ReplayBag:
-    empty: dict[int, object] = {}
-    return ReplayBag(
-        "run", "", tuple(signals), None, None, empty, empty, gap_log(()), (), (), None, ()
-    )  # type: ignore[arg-type]
+    return ReplayBag("run", "", tuple(signals), None, None, {}, {}, (), (), None, ())
 
 
 def signal(kind: str, k: int, value: float) -> Signal:
@@ -56,25 +53,25 @@ def run(
     return settings, signals
 
 
-def replayed(settings: ControllerNodeSettings, signals: list[Signal]) -> OpMatch:
+def replayed(settings: ControllerNodeSettings, signals: list[Signal]) -> Comparison:
     return replay_controller(bag(signals), settings, MODEL, (), S).op
 
 
 @pytest.mark.parametrize("pace", ["lockstep", "realtime"])
 def test_what_was_applied_counts(pace: str) -> None:
     settings, signals = run(pace, stuck=range(20, 24))
-    assert replayed(settings, signals) == OpMatch(SAMPLES, SAMPLES)
+    assert replayed(settings, signals) == Comparison(SAMPLES, SAMPLES)
     untold = [one for one in signals if one.kind != "op_applied" or one.stamp == 0]
     assert replayed(settings, untold).first_difference.startswith("op at 2")
 
 
 def test_samples_passed_over_and_without_pv_are_replayed_as_such() -> None:
     settings, signals = run("realtime", passed=range(30, 35), lost=range(40, 43))
-    assert replayed(settings, signals) == OpMatch(SAMPLES - 5, SAMPLES - 5)
+    assert replayed(settings, signals) == Comparison(SAMPLES - 5, SAMPLES - 5)
 
 
 def test_values_out_of_range_are_left_out_as_they_were_live() -> None:
     settings, signals = run("lockstep", lost=range(40, 43))
     wild = [signal("pv", k, 1e6) for k in range(40, 43)]
     found = replayed(settings, [*signals, *wild])
-    assert found == OpMatch(SAMPLES, SAMPLES)
+    assert found == Comparison(SAMPLES, SAMPLES)

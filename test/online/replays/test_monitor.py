@@ -99,7 +99,7 @@ def test_another_figure_is_named(bag: Path, tmp_path: Path) -> None:
     assert found.monitor is not None
     assert (found.monitor.looks, found.monitor.equal_looks) == (12, 11)
     assert found.first_difference == (
-        "gap of the window that ends at 549 s: begin: recorded 251, replayed 250"
+        "gap of the window that ends at 549 s: look.begin: recorded 251, replayed 250"
     )
 
 

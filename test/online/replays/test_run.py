@@ -19,9 +19,8 @@ from stiction_ros.identification import Identification, IdentificationOptions
 from stiction_ros.online.estimator.live import fit
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.online.replays.bag import read_replay_bag
-from stiction_ros.online.replays.estimator import ReplayedEstimator, identification_of
-from stiction_ros.online.replays.matching import as_told, first_difference
-from stiction_ros.online.replays.result import Match, Replay
+from stiction_ros.online.replays.estimator import identification_of, replay_estimator
+from stiction_ros.online.replays.result import Match, Replay, first_difference
 from stiction_ros.online.replays.run import replay
 from stiction_ros.online.session import LiveRun
 from stiction_ros.records.bag.messages import read_messages, read_raw
@@ -65,7 +64,7 @@ def each_fit_once() -> Iterator[None]:
         return known[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ReplayedEstimator.__init__, "__defaults__", (None, None, remembered))
+        patch.setattr("stiction_ros.online.replays.estimator.fit", remembered)
         yield
 
 
@@ -134,7 +133,7 @@ def test_a_bag_that_begins_late_is_compared_from_its_first_whole_window(
     found = replay(cut_bag(bag, tmp_path / "bag", first=121.0))
     assert not found.from_first_sample
     assert found.op is None
-    assert [(fit.fit.whole, fit.match) for fit in found.fits] == [
+    assert [(fit.whole, fit.match) for fit in found.fits] == [
         (False, Match.NOT_COMPARED),
         (True, Match.EQUAL),
         (True, Match.EQUAL),
@@ -203,7 +202,7 @@ def without(*names: str) -> Spoil:
 def test_another_op_is_named_by_its_time(bag: Path, tmp_path: Path) -> None:
     found = replay(copy_bag(bag, tmp_path / "bag", joint(bag, "/op", 510, 1e-12)))
     assert found.match is Match.DIFFERENT
-    assert found.first_difference.startswith("op at 509 s: recorded [")
+    assert found.first_difference.startswith("op at 509 s: recorded (")
     assert found.op is not None
     assert found.op.compared - found.op.equal == 1
 
@@ -221,8 +220,8 @@ def test_another_friction_in_stiction_is_named(bag: Path, tmp_path: Path) -> Non
     spoilt = found.fits[1]
     assert spoilt.match is Match.DIFFERENT
     estimate = spoilt.fit.rows["V1.f_s"][0]
-    assert (
-        spoilt.difference == f"V1.f_s, value: recorded {estimate + 0.25!r}, replayed {estimate!r}"
+    assert spoilt.difference == (
+        f"stiction.V1.f_s.value: recorded {estimate + 0.25!r}, replayed {estimate!r}"
     )
 
 
@@ -235,9 +234,7 @@ def test_another_moment_of_the_swap_is_named(bag: Path, swap: int, tmp_path: Pat
     found = replay(copy_bag(bag, tmp_path / "bag", later))
     assert found.modes is not None
     assert found.modes.match is Match.DIFFERENT
-    assert "changes of mode recorded" in found.modes.difference or (
-        "change 2: " in found.modes.difference
-    )
+    assert found.modes.difference.startswith(("change 2", "changes of mode: recorded"))
 
 
 def test_a_lost_sample_is_noted(bag: Path, tmp_path: Path) -> None:
@@ -326,7 +323,9 @@ def test_of_several_loops_one_is_chosen_by_its_namespace(bag: Path, tmp_path: Pa
     assert read_replay_bag(path, namespace="two").namespace == "/two"
 
 
-def test_a_fit_that_fails_leaves_the_next_one_alone(bag: Path) -> None:
+def test_a_fit_that_fails_leaves_the_next_one_alone(
+    bag: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     recorded = read_replay_bag(bag)
     assert recorded.estimator is not None
     settings = from_mapping(EstimatorNodeSettings, recorded.estimator.parameters, "")
@@ -336,13 +335,12 @@ def test_a_fit_that_fails_leaves_the_next_one_alone(bag: Path) -> None:
         calls.append(len(calls))
         if len(calls) == 1:
             raise RuntimeError("no memory")
-        return identification_of(recorded.told_fits[450 * SECOND].identification)
+        return identification_of(recorded.told["identification"][450 * SECOND]["identification"])
 
-    estimator = ReplayedEstimator(settings, fitter=fitter)
-    for signal in recorded.signals:
-        if signal.kind in ("pv", "op") and signal.stamp <= 460 * SECOND:
-            estimator.take(signal)
-    first, second = estimator.fits
+    monkeypatch.setattr("stiction_ros.online.replays.estimator.fit", fitter)
+    early = tuple(one for one in recorded.signals if one.stamp <= 460 * SECOND)
+    found = replay_estimator(dataclasses.replace(recorded, signals=early), settings, SECOND)
+    first, second = found.fits
     assert first.failure == "window not usable: RuntimeError('no memory')"
     assert first.rows == {}
     assert second.update is not None
@@ -355,23 +353,11 @@ def test_a_fit_that_fails_leaves_the_next_one_alone(bag: Path) -> None:
         ({"a": {"b": [1, 2]}}, {"a": {"b": [1, 3]}}, "a.b.1: recorded 2, replayed 3"),
         ({"a": [1]}, {"a": [1, 2]}, "a: recorded [1], replayed [1, 2]"),
         ({"a": 1}, {}, "a: recorded 1, replayed None"),
-        ({"seconds": 1.0}, {"seconds": 2.0}, ""),
-    ],
-)
-def test_the_first_difference_is_named(one: object, other: object, said: str) -> None:
-    assert first_difference(one, other) == said
-
-
-@pytest.mark.parametrize(
-    ("recorded", "found", "said"),
-    [
         ({"a": [{"b": 1}]}, {"a": [{"b": 1, "new": 2}], "new": 3}, ""),
         ({"a": [{"b": 1}]}, {"a": [{"b": 2, "new": 2}]}, "a.0.b: recorded 1, replayed 2"),
-        ({"a": 1, "gone": 2}, {"a": 1}, "gone: recorded 2, replayed None"),
-        ({"a": [1]}, {"a": [1, 2]}, "a: recorded [1], replayed [1, 2]"),
     ],
 )
-def test_what_an_older_version_did_not_tell_is_no_difference(
-    recorded: object, found: object, said: str
+def test_the_first_difference_is_named_and_what_an_older_version_did_not_tell_is_none(
+    one: object, other: object, said: str
 ) -> None:
-    assert first_difference(recorded, as_told(recorded, found)) == said
+    assert first_difference(one, other) == said

@@ -1,0 +1,236 @@
+"""The estimator of a running loop behind its messages: pairing, fits, monitor, what is told."""
+
+import dataclasses
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.errors import InputError
+from stiction_ros.identification import Identification
+from stiction_ros.loop import LoopModel
+from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
+from stiction_ros.online.handover.hand_over import AtOnce
+from stiction_ros.online.input.port_health import Notice
+from stiction_ros.online.input.samples import picked
+from stiction_ros.online.monitor.gap_finding import GapFinding
+from stiction_ros.online.monitor.gap_monitor import GapLook
+from stiction_ros.online.monitor.monitoring import Monitoring
+from stiction_ros.online.node_settings import EstimatorNodeSettings
+from stiction_ros.online.pairing import NEW_RUN, PairedSample
+from stiction_ros.texts import json_text
+
+SECOND = 10**9
+Keys = list[tuple[str, object]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Fit:
+    """One fit, as it is told."""
+
+    end: int  # last sample of the window, counted from the first sample of the run
+    stamp: int  # its time, ns
+    token: str  # ``valid_from`` of the loop model in force after it, as text
+    update: FitUpdate | None = None  # what the fit says; None when the window was not usable
+    error: Exception | None = None  # why it was not usable; None also where samples are missing
+    model_text: str = ""  # YAML of the loop model that it publishes, or empty
+
+    @property
+    def rows(self) -> dict[str, tuple[float, float, float]]:
+        """Value, lower and upper end by ``V1.f_s``, %, as ``stiction`` carries them."""
+        return {} if self.update is None else self.update.identification.rows
+
+    @property
+    def verdicts(self) -> str:
+        """The verdicts in one line."""
+        valves = () if self.update is None else self.update.identification.valves
+        return ", ".join(f"{v.name} {v.verdict}" for v in valves)
+
+    @property
+    def failure(self) -> str:
+        """Why the window was not usable; empty where it was."""
+        if self.update is not None:
+            return ""
+        if self.error is None:
+            return "samples are missing"
+        said = str(self.error) if isinstance(self.error, InputError) else repr(self.error)
+        return f"window not usable: {said}"
+
+
+Told = Notice | Fit | GapLook | GapFinding
+
+
+class LoopEstimator:
+    """Takes messages as they come and returns what is to be told, in order.
+
+    Attributes:
+        pairs: what pairs PV and OP.
+        live, monitoring: estimator and monitor; None before the first sample.
+        tags: of ``pv`` and ``op``, as the first message of each told them.
+        refused: messages that lacked a tag, by ``pv`` and ``op``.
+        first, samples: number of the first sample, None before it; one more than that of the last.
+        stamp: of the last sample, ns.
+        token: ``valid_from`` of the loop model in force, as text.
+    """
+
+    def __init__(
+        self,
+        settings: EstimatorNodeSettings,
+        watched: LoopModel | None = None,
+        submit: Callable[..., "Future[Any]"] | None = None,
+        fitter: Callable[..., Identification] = fit,
+    ) -> None:
+        """Start empty.
+
+        Args:
+            settings: of estimator and monitor; those that no fit can use are refused.
+            watched: what the monitor compares with; None for the loop as it is identified.
+            submit: runs a function beside the loop, one after the other; None does it at once.
+            fitter: makes one fit.
+        """
+        settings.options()
+        self.settings, self._watched = settings, watched
+        self._submit, self._fitter = submit or AtOnce().submit, fitter
+        self.refused: Counter[str] = Counter()
+        self.samples = self.stamp = 0
+        self.token = ""
+        self._begin()
+
+    def _begin(self) -> None:
+        self.pairs = self.settings.pairing()
+        self.live: LiveEstimator | None = None
+        self.monitoring: Monitoring | None = None
+        self.tags: dict[str, tuple[str, ...]] = {"pv": (), "op": ()}
+        self.first: int | None = None
+        self._pending: deque[tuple[int, Future[Identification]]] = deque()
+        self._strange: Counter[tuple[str, ...]] = Counter()
+
+    def retune(self, settings: EstimatorNodeSettings) -> None:
+        """Change settings from the next sample on."""
+        settings.options()
+        self.settings = settings
+        self.pairs.retune(*settings.bridges())
+        if self.live is not None and self.monitoring is not None:
+            self.live.retune(settings)
+            self.monitoring.retune(settings)
+
+    # ---- messages in -----------------------------------------------------------------------
+
+    def take(
+        self, topic: str, stamp: int, tags: Sequence[str], values: Sequence[float]
+    ) -> list[Told]:
+        """Take in a message of ``pv``, ``op`` or ``op_applied``; the first ones tell the tags.
+
+        One that lacks a tag is left out. When many in succession have other tags, the first was
+        a stray, or the loop is another one: all begins anew.
+        """
+        kind, given = topic.removesuffix("_applied"), tuple(tags)
+        known = self.tags[kind] or given
+        found = picked(given, values, known) if known else None
+        if found is None:
+            return self._refuse(kind, given, len(given) == len(values))
+        self.tags[kind] = known
+        self._strange = Counter({k: n for k, n in self._strange.items() if k[0] != kind})
+        pairs = self.pairs
+        add = {"pv": pairs.add_pv, "op": pairs.add_op, "op_applied": pairs.add_applied}[topic]
+        return [told for sample in add(stamp, found) for told in self.add(sample)]
+
+    def _refuse(self, kind: str, given: tuple[str, ...], whole: bool) -> list[Told]:
+        self.refused[kind] += 1
+        text = f"{kind} without a value for each tag is left out"
+        if given and whole:
+            self._strange[kind, *given] += 1
+        if self._strange[kind, *given] >= NEW_RUN:
+            text = f"{kind} has other tags now: all begins anew"
+            self._begin()
+        return [Notice(f"tags of {kind}", "warn", text)]
+
+    def add(self, found: PairedSample) -> list[Told]:
+        """Take in one sample."""
+        settings = self.settings
+        if self.live is None or self.monitoring is None:
+            names = (settings.loop, self.tags["op"], self.tags["pv"])
+            self.live = LiveEstimator(settings, *names, settings.sample_time)
+            self.monitoring = Monitoring(settings, self.live, self._watched, self._submit)
+            self.first = found.sample
+        told: list[Told] = []
+        if found.missed or found.begins:
+            self.live.restart()
+            self.monitoring.restart()
+            told += self._skipped(found)
+        elif not np.isfinite(found.pv).all():
+            text = f"bad samples from {found.sample} on, window anew"
+            told.append(Notice("missed", "warn", text))
+        self.stamp, self.samples = found.stamp, found.sample + 1
+        record = self.live.add(found.sample, found.op, found.pv)
+        if record is not None:
+            future = self._submit(self._fitter, record, self.live.options())
+            self._pending.append((found.sample, future))
+            told += self.collect()
+        look = self.monitoring.add(found.sample, found.op, found.pv)
+        return [*told, *([] if look is None else [look]), *self.collect()]
+
+    def _skipped(self, found: PairedSample) -> list[Told]:
+        """Return what is told of samples that never came: no window may hold them."""
+        told: list[Told] = []
+        if found.begins:
+            told.append(Notice("run", "warn", f"a new run begins at stamp {found.stamp} ns"))
+        if found.missed:
+            text = f"{found.missed} samples missed before sample {found.sample}, window anew"
+            told.append(Notice("missed", "warn", text))
+        lost = filter(self.settings.due, range(found.sample - found.missed, found.sample))
+        return told + [Fit(sample, self.pairs.stamp_of(sample), self.token) for sample in lost]
+
+    # ---- fits out --------------------------------------------------------------------------
+
+    def collect(self) -> list[Told]:
+        """Return every fit that is done, in order, and what the monitor has found."""
+        told: list[Told] = []
+        if self.live is None or self.monitoring is None:
+            return told
+        while self._pending and self._pending[0][1].done():
+            end, future = self._pending.popleft()
+            if future.cancelled():
+                self.live.drop(end)
+            else:
+                told.append(self._concluded(self.live, self.monitoring, end, future))
+        return told + list(self.monitoring.collect())
+
+    def _concluded(
+        self, live: LiveEstimator, monitoring: Monitoring, end: int, future: Future[Identification]
+    ) -> Fit:
+        stamp, text = self.pairs.stamp_of(end), ""
+        try:
+            update = live.conclude(end, future.result())
+            monitoring.learn(update)
+        except Exception as error:  # one fit that fails must not end the estimator
+            live.drop(end)
+            return Fit(end, stamp, self.token, error=error)
+        if update.loop_model is not None:
+            step = round(self.settings.sample_time * SECOND)
+            valid_from = stamp + self.settings.fit_latency * step
+            self.token = str(valid_from)
+            text = update.loop_model.to_yaml(valid_from=valid_from)
+        return Fit(end, stamp, self.token, update, model_text=text)
+
+    @property
+    def running(self) -> int:
+        """How many fits are being made."""
+        return len(self._pending)
+
+    def status_of(self, told: Fit | GapLook | GapFinding) -> tuple[str, str, Keys]:
+        """Return task, message and key-values of the status that tells a result, once."""
+        keys: Keys = [("window_end", self.pairs.stamp_of(told.end))]
+        if isinstance(told, GapFinding):
+            keys.insert(0, ("window_begin", self.pairs.stamp_of(told.begin)))
+        if not isinstance(told, Fit):
+            task, key = ("gap", "look") if isinstance(told, GapLook) else ("finding", "finding")
+            return task, told.text, [*keys, (key, json_text(told.to_dict(), indent=None))]
+        assert told.update is not None
+        for name, friction in told.update.trusted.items():
+            keys.append((f"{name}.trusted_law", friction.law))
+            keys += [(f"{name}.trusted_{key}", value) for key, value in friction.figures().items()]
+        document = told.update.identification.to_dict()
+        return "fit", told.verdicts, [*keys, ("identification", json_text(document, indent=None))]
