@@ -4,6 +4,7 @@ import dataclasses
 import functools
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Executor
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.controller.making import controller_of, design_for
 from stiction_ros.online.controller.settings import LiveControllerSettings
-from stiction_ros.online.handover.hand_over import AtOnce, Background, HandOver, Past
+from stiction_ros.online.handover.hand_over import AtOnce, HandOver, Past
 from stiction_ros.online.handover.known_friction import alike, frictions_of
 from stiction_ros.online.handover.offers import Judge, last_samples
 from stiction_ros.online.handover.watch import Approach, Watch
@@ -46,10 +47,7 @@ class LiveController:
     """
 
     def __init__(
-        self,
-        settings: LiveControllerSettings,
-        model: LoopModel,
-        background: Background | None = None,
+        self, settings: LiveControllerSettings, model: LoopModel, background: Executor | None = None
     ) -> None:
         """Build the first controller on ``model``, whose own valve effects are taken as known.
 
@@ -65,7 +63,7 @@ class LiveController:
         self.settings, self.model = settings, model
         self._design: ControlDesign = settings.design(model)
         self._build = functools.partial(controller_of, model.valve_names)
-        self._background: Background = background or AtOnce()
+        self._background: Executor = background or AtOnce()
         self._known = model
         self._watch = Watch(settings)
         upsets = self._design.model.e.shape[1]
@@ -335,17 +333,17 @@ class LiveController:
         if not change.ready:
             return change
         try:
-            ready = change.take(self._past)
+            found = change.take(self._past)
         except Exception as error:  # whatever an offer holds, it must not end the loop
             said = str(error) if isinstance(error, InputError) else type(error).__name__
             self.doubts.append((self._sample, f"it cannot be prepared: {said}"))
             return None
-        if ready.controller is None:
-            self.doubts.append((self._sample, ready.doubt))
+        if isinstance(found, str):
+            self.doubts.append((self._sample, found))
             every = self.settings.fit_every
             change.put_off((self._sample // every + 1) * every)
             return change
-        take(change, ready.controller)
+        take(change, found)
         return None
 
     def _commit_settings(self, change: HandOver, controller: MpcController) -> None:

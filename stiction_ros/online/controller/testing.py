@@ -1,6 +1,7 @@
 """The controller of a running loop that may also test its valve."""
 
 import dataclasses
+from concurrent.futures import Executor, Future
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,12 +13,9 @@ from stiction_ros.identification.answer.step_answer import StepAnswer
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.controller.live import LiveController, ModeChange
 from stiction_ros.online.controller.settings import LiveControllerSettings
-from stiction_ros.online.handover.hand_over import Background
 from stiction_ros.processes import LinearModel
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
-
     from stiction_ros.online.controller.valve_test import ValveTest
 
 LONGEST = 5000  # samples of the step response that are looked at
@@ -36,10 +34,7 @@ class ValveTestingController(LiveController):
     """
 
     def __init__(
-        self,
-        settings: LiveControllerSettings,
-        model: LoopModel,
-        background: Background | None = None,
+        self, settings: LiveControllerSettings, model: LoopModel, background: Executor | None = None
     ) -> None:
         super().__init__(settings, model, background)
         self.test: ValveTest | None = None

@@ -1,7 +1,7 @@
 """A valve test in a running loop, a sample at a time."""
 
 import math
-from concurrent.futures import Future
+from concurrent.futures import Executor, Future
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from stiction_ros.identification.valve_test.plan import (
     further_round,
     stays,
 )
-from stiction_ros.online.handover.hand_over import Background
 
 MOST = 30
 """Moves of a test: three rounds of five pairs, as many as go from the smallest friction of interest
@@ -35,7 +34,7 @@ class ValveTest:
     """
 
     def __init__(
-        self, facts: Facts, hold: int, background: Background, margin: float = math.inf
+        self, facts: Facts, hold: int, background: Executor, margin: float = math.inf
     ) -> None:
         """Begin with OP where it is.
 

@@ -15,10 +15,6 @@ from stiction_ros.online.handover.offers import Judge, Maker
 T = TypeVar("T")
 
 
-# Runs what would make a step long: reading a model, building and judging a controller.
-Background = Executor
-
-
 class AtOnce(Executor):
     """Does the work within the call, so that a run in lockstep does not depend on speed."""
 
@@ -77,15 +73,6 @@ class Past:
         return History(self._op[rows].copy(), self._pv[rows].copy(), self._dv[rows].copy())
 
 
-@dataclasses.dataclass(frozen=True)
-class Ready:
-    """A controller that has taken in the past, or why it may not take over."""
-
-    controller: MpcController | None  # as of ``seen``; None where there is a doubt
-    seen: int  # how many samples of the loop it has taken in
-    doubt: str  # why the past speaks against it; empty for nothing
-
-
 @dataclasses.dataclass
 class HandOver:
     """One change of controller on its way."""
@@ -95,11 +82,22 @@ class HandOver:
     model: LoopModel  # whose valves it knows
     make: Maker  # builds it; may raise InputError
     judge: Judge | None = None  # holds it against the past; None where it is not judged
-    _work: Future[Ready] | None = None
+    _work: Future[MpcController | str] | None = None
+    _seen: int = 0  # how many samples of the loop were known when the work began
 
-    def prepare(self, background: Background, past: Past) -> None:
+    def prepare(self, background: Executor, past: Past) -> None:
         """Begin to make it ready, from what is known of the past now."""
-        self._work = background.submit(_make_ready, self, past.history(), past.count)
+        self._seen = past.count
+        self._work = background.submit(self._made_ready, past.history())
+
+    def _made_ready(self, history: History) -> MpcController | str:
+        doubt = "" if self.judge is None else self.judge.doubt(self.make, history)
+        if doubt:
+            return doubt
+        controller = self.make()
+        if len(history.op):
+            controller.take_over(history)
+        return controller
 
     @property
     def begun(self) -> bool:
@@ -117,24 +115,14 @@ class HandOver:
             self._work.cancel()
         self.at, self._work = at, None
 
-    def take(self, past: Past) -> Ready:
-        """Return what was made ready, brought up to the present sample.
+    def take(self, past: Past) -> MpcController | str:
+        """Return the controller, brought up to the present sample, or what speaks against it.
 
         Raises:
             InputError: it could not be built.
         """
         assert self._work is not None
         found = self._work.result()
-        if found.controller is not None and found.seen < past.count:
-            found.controller.follow(past.since(found.seen))
+        if not isinstance(found, str) and self._seen < past.count:
+            found.follow(past.since(self._seen))
         return found
-
-
-def _make_ready(change: HandOver, history: History, seen: int) -> Ready:
-    doubt = "" if change.judge is None else change.judge.doubt(change.make, history)
-    if doubt:
-        return Ready(None, seen, doubt)
-    controller = change.make()
-    if len(history.op):
-        controller.take_over(history)
-    return Ready(controller, seen, "")

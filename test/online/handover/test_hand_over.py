@@ -38,10 +38,10 @@ def past_of(samples: int) -> Past:
 def test_what_is_made_ready_early_is_brought_up_to_the_present() -> None:
     early = HandOver(0, "test", PROCESS, AWARE)
     early.prepare(AtOnce(), past_of(200))
-    found = early.take(past_of(240)).controller
+    found = early.take(past_of(240))
     now = AWARE()
     now.take_over(past_of(240).history(), samples=100)
-    assert found is not None
+    assert isinstance(found, MpcController)
     assert found.stem.tolist() == now.stem.tolist()
     assert found.observer.state.tolist() == now.observer.state.tolist()
     assert found.observer.disturbance.tolist() == now.observer.disturbance.tolist()
@@ -63,9 +63,9 @@ def test_a_thread_does_the_same_as_the_call() -> None:
     for change, where in zip(changes, (AtOnce(), background), strict=True):
         change.prepare(where, past_of(150))
     background.shutdown()
-    one, other = (change.take(past_of(150)).controller for change in changes)
-    assert one is not None
-    assert other is not None
+    one, other = (change.take(past_of(150)) for change in changes)
+    assert isinstance(one, MpcController)
+    assert isinstance(other, MpcController)
     assert one.observer.state.tolist() == other.observer.state.tolist()
 
 
@@ -74,8 +74,8 @@ def test_a_past_without_any_measurement_can_be_taken_over() -> None:
     past.add(np.array([50.0]), np.array([np.nan]), np.zeros(0))
     change = HandOver(0, "test", PROCESS, AWARE)
     change.prepare(AtOnce(), past)
-    found = change.take(past).controller
-    assert found is not None
+    found = change.take(past)
+    assert isinstance(found, MpcController)
     assert np.isfinite(found.observer.state).all()
 
 
