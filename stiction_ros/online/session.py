@@ -34,7 +34,6 @@ from stiction_ros.online.input.signal_check import SignalCheck
 from stiction_ros.online.loop_estimator import Fit, LoopEstimator, Told
 from stiction_ros.online.monitor.gap_finding import GapFinding
 from stiction_ros.online.monitor.gap_monitor import GapLook
-from stiction_ros.online.monitor.monitoring import check_model
 from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
 from stiction_ros.online.pairing import PairedSample
 from stiction_ros.online.plain_settings import (
@@ -215,16 +214,10 @@ class Scenario(SimulatedPlant):
             for node in ("controller", "estimator")
         }
         controller = checked["controller"]
-        process = LoopModel.load(path.parent / controller.model)
-        if (process.valve_names, process.outputs) != (model.valve_names, model.outputs):
-            raise InputError(
-                "names other valves or outputs than the plant's model",
-                where=f"{path}: controller: {controller.model}",
-                fix=f"use {', '.join(model.valve_names)} and {', '.join(model.outputs)}",
-            )
+        process = _known_loop(path, "controller", controller.model, model)
         watched: LoopModel | None = None
         if checked["estimator"].monitor_model:
-            watched = LoopModel.load(path.parent / checked["estimator"].monitor_model)
+            watched = _known_loop(path, "estimator", checked["estimator"].monitor_model, model)
         for key in (field.name for field in dataclasses.fields(FitSchedule)):
             own, awaited = getattr(checked["estimator"], key), getattr(controller, key)
             if own != awaited:
@@ -236,8 +229,6 @@ class Scenario(SimulatedPlant):
         try:
             controller.design(process)
             checked["estimator"].options()
-            if watched is not None:
-                check_model(watched, model.valve_names, model.outputs, model.sample_time)
         except InputError as error:
             raise error.within(str(path)) from None
         return cls(
@@ -250,6 +241,19 @@ class Scenario(SimulatedPlant):
             estimator=checked["estimator"],
             monitor_model=watched,
         )
+
+
+def _known_loop(path: Path, node: str, name: str, plant: LoopModel) -> LoopModel:
+    """Return the model that a node is given; one of another loop than the plant's is refused."""
+    known = LoopModel.load(path.parent / name)
+    own, wanted = ((m.valve_names, m.outputs, m.sample_time) for m in (known, plant))
+    if own != wanted:
+        raise InputError(
+            "has other valves, outputs or another sample time than the plant's model",
+            where=f"{path}: {node}: {name}",
+            fix=f"use {', '.join((*plant.valve_names, *plant.outputs))}, {plant.sample_time:g} s",
+        )
+    return known
 
 
 @dataclasses.dataclass(frozen=True)
@@ -302,9 +306,7 @@ class LoopSession:
             self.estimator = LoopEstimator(settings, scenario.monitor_model)
             self.estimator.pairs.origin = 0
             self.estimator.tags = {"pv": plant.outputs, "op": plant.valve_names}
-        self.looks: list[GapLook] = []
-        self.findings: list[GapFinding] = []
-        self.fits: list[FitUpdate] = []
+        self._told: list[Told] = []
         self.stems: list[FloatArray] = []
         self._latency = scenario.controller.fit_latency
         self._sample = 0
@@ -317,27 +319,29 @@ class LoopSession:
             stamp = self.estimator.pairs.stamp_of(self._sample)
             found = PairedSample(self._sample, stamp, result.op, measurement.pv)
             for told in self.estimator.add(found):
-                self._learn(told)
+                self._told.append(told)
+                if isinstance(told, Fit):
+                    self._learn(told)
         self._sample += 1
         return result.op
 
-    def _learn(self, told: Told) -> None:
-        if isinstance(told, GapLook):
-            self.looks.append(told)
-        elif isinstance(told, GapFinding):
-            self.findings.append(told)
-        elif isinstance(told, Fit) and told.update is not None:
-            self.fits.append(told.update)
-            if told.update.loop_model is not None:
-                self.controller.offer(told.update.loop_model, self._sample + self._latency)
-        elif isinstance(told, Fit) and told.error and not isinstance(told.error, InputError):
-            raise told.error  # a window that cannot be used changes nothing
+    def _learn(self, found: Fit) -> None:
+        if found.error is not None and not isinstance(found.error, InputError):
+            raise found.error  # a window that cannot be used changes nothing
+        if found.update is not None and found.update.loop_model is not None:
+            self.controller.offer(found.update.loop_model, self._sample + self._latency)
 
     def told(self, run: ClosedLoopRun) -> LiveRun:
         """Return what has happened so far, with the signals of ``run``."""
-        changes = tuple(self.controller.changes)
-        noted = tuple(self.fits), tuple(self.looks), tuple(self.findings)
-        return LiveRun(run, np.array(self.stems), changes, *noted)
+        fits = (one.update for one in self._told if isinstance(one, Fit))
+        return LiveRun(
+            run,
+            np.array(self.stems),
+            tuple(self.controller.changes),
+            tuple(update for update in fits if update is not None),
+            tuple(one for one in self._told if isinstance(one, GapLook)),
+            tuple(one for one in self._told if isinstance(one, GapFinding)),
+        )
 
 
 def run_live(

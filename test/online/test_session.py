@@ -243,6 +243,16 @@ def test_a_missing_node_is_named(node: str, tmp_path: Path) -> None:
         Scenario.load(path)
 
 
+@pytest.mark.parametrize(("node", "key"), [("controller", "model"), ("estimator", "monitor_model")])
+@pytest.mark.parametrize("file", ["tank.loop.yaml", "slow.loop.yaml"])
+def test_a_model_of_another_loop_is_refused(node: str, key: str, file: str, tmp_path: Path) -> None:
+    slow = LoopModel.load(find_config("example1.loop.yaml")).to_mapping() | {"sample_time": 2.0}
+    (tmp_path / "slow.loop.yaml").write_text(yaml.safe_dump(slow))
+    (tmp_path / "tank.loop.yaml").write_text(find_config("tank.loop.yaml").read_text())
+    with pytest.raises(InputError, match=f"{node}: {file}: has other valves, .* use V1, PV1, 1 s"):
+        Scenario.load(written(tmp_path, node, key, file))
+
+
 def test_a_scenario_finds_its_files_beside_itself(tmp_path: Path) -> None:
     path = written(tmp_path, "plant", "seed", 77)
     assert Scenario.load(path).seed == 77

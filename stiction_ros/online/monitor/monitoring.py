@@ -1,7 +1,7 @@
 """The monitor with its model and its work, wherever that runs: in a node, a session, a replay."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
 from typing import Any
 
@@ -14,28 +14,6 @@ from stiction_ros.online.monitor.gap_finding import GapFinding, find_in_window, 
 from stiction_ros.online.monitor.gap_monitor import GapLook, GapMonitor, MonitorRule
 
 Submit = Callable[..., "Future[Any]"]
-
-
-def check_model(
-    model: LoopModel, valves: Sequence[str], outputs: Sequence[str], sample_time: float
-) -> None:
-    """Refuse a model of another loop, by its tags and its sample time."""
-    for what, wanted, found in (
-        ("valves", valves, model.valve_names),
-        ("outputs", outputs, model.outputs),
-    ):
-        if set(wanted) != set(found):
-            raise InputError(
-                f"has the {what} {', '.join(found)}",
-                where=f"monitor_model {model.name}",
-                fix=f"use a model with {', '.join(wanted)}",
-            )
-    if abs(model.sample_time - sample_time) > 1e-3 * sample_time:
-        raise InputError(
-            f"is sampled every {model.sample_time:g} s, the loop every {sample_time:g} s",
-            where=f"monitor_model {model.name}",
-            fix="use a model of this sample time",
-        )
 
 
 def with_friction_of(model: LoopModel, identified: LoopModel) -> LoopModel:
@@ -84,9 +62,7 @@ class Monitoring:
         self.look: GapLook | None = None
         self.finding: GapFinding | None = None
         if given is not None:
-            published = live.published_model
-            model = given if published is None else with_friction_of(given, published)
-            self.monitor.use(model, 0)
+            self.monitor.use(given, 0)
 
     @property
     def running(self) -> int:

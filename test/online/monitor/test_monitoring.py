@@ -24,7 +24,7 @@ from stiction_ros.identification import (
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.live import EstimatorSettings, FitUpdate, LiveEstimator
 from stiction_ros.online.monitor.gap_monitor import MonitorRule
-from stiction_ros.online.monitor.monitoring import Monitoring, check_model, with_friction_of
+from stiction_ros.online.monitor.monitoring import Monitoring, with_friction_of
 
 SETTINGS = EstimatorSettings(fit_first=20, fit_every=10, fit_latency=5, confirmations=1)
 SHIFTED = record(shifted(), 1200)
@@ -171,10 +171,3 @@ def test_turned_on_again_it_has_found_nothing_yet() -> None:
     monitoring.retune(MonitorRule())
     monitoring.retune(RULE)
     assert (monitoring.look, monitoring.finding) == (None, None)
-
-
-def test_a_model_of_another_loop_is_refused() -> None:
-    with pytest.raises(InputError, match=r"monitor_model watched: has the outputs PV1; use.*PV2"):
-        check_model(loop(), ["V1"], ["PV2"], 1.0)
-    with pytest.raises(InputError, match="sampled every 1 s, the loop every 2 s"):
-        check_model(loop(), ["V1"], ["PV1"], 2.0)
