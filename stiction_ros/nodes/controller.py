@@ -17,6 +17,7 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.nodes.shared.managed import (
     LATCHED_QOS,
     LATCHED_READER_QOS,
+    LOOKS,
     READER_QOS,
     SIGNAL_QOS,
     ManagedNode,
@@ -45,7 +46,6 @@ from stiction_ros.texts import json_text
 
 QUICKEST, SLOWEST = 0.02, 0.25  # s between two looks for samples that are due
 LEARNS = ("auto", "valve_test")  # modes in which it waits for the fits of the estimator
-GRAPH_PERIOD = 1.0  # s between two looks at who commands
 DRAINED = ("op_applied", "sp", "dv", "pv")  # what is read to the end before a step, in this order
 
 
@@ -91,7 +91,6 @@ class ControllerNode(ManagedNode):
         self._result: StepResult | None = None
         self._sent_at: float | None = None
         self._running_since = time.monotonic()
-        self._graph_at = 0.0
         others = ("plant", "estimator")
         self._op = self.outlet(JointState, "op", SIGNAL_QOS, others)
         self._prediction = self.outlet(JointTrajectory, "prediction", SIGNAL_QOS)
@@ -193,9 +192,8 @@ class ControllerNode(ManagedNode):
         state = self.port.state(now)
         for notice in self._port_health.look(state, now - self._running_since):
             self.notice(*notice)
-        if now - self._graph_at >= GRAPH_PERIOD:
-            self._graph_at = now
-            self._look_at_graph()
+        if self._looks % LOOKS == 0 and len(names := publishers_of(self, "op")) > 1:
+            self.notice("commanders", "error", f"op is published by {', '.join(sorted(names))}")
         patience = self.settings.fit_timeout
         if self._waiting_since is not None and now - self._waiting_since > patience:
             self.end(f"no fit came within {patience:g} s; raise fit_timeout or check the estimator")
@@ -280,14 +278,6 @@ class ControllerNode(ManagedNode):
         if self._waiting_since is None:
             self._waiting_since = time.monotonic()
         return False
-
-    # ---- health ----------------------------------------------------------------------------
-
-    def _look_at_graph(self) -> None:
-        """See whether someone else commands the same valves."""
-        names = publishers_of(self, "op")
-        if len(names) > 1:
-            self.notice("commanders", "error", f"op is published by {', '.join(sorted(names))}")
 
     # ---- messages in -----------------------------------------------------------------------
 

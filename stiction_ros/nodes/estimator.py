@@ -17,8 +17,7 @@ from stiction_ros.nodes.shared.messages import friction_message, to_ns
 from stiction_ros.nodes.shared.peers import PLANTS
 from stiction_ros.online.estimator.live import FitUpdate
 from stiction_ros.online.estimator.worker import FitWorker
-from stiction_ros.online.health import stopped_after
-from stiction_ros.online.input.port_health import Notice
+from stiction_ros.online.health import Notice, stopped_after
 from stiction_ros.online.loop_estimator import Fit, Keys, LoopEstimator, Told
 from stiction_ros.online.monitor.gap_finding import GapFinding
 from stiction_ros.online.monitor.monitoring import Monitoring

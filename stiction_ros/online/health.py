@@ -1,6 +1,7 @@
 """What a node has noticed, shown long enough to be seen and no longer than it lasts."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 LEVELS = ("ok", "warn", "error")
 SHOWN = 2.5  # s after the last time, so that a status at 1 Hz tells of it twice at least
@@ -9,6 +10,14 @@ SHOWN = 2.5  # s after the last time, so that a status at 1 Hz tells of it twice
 def stopped_after(period: float) -> float:
     """Return the silence, s, after which a loop of this wall time per sample has stopped."""
     return max(3.0 * period, 0.5)
+
+
+class Notice(NamedTuple):
+    """One thing to be noticed: its name, warn or error, and a sentence."""
+
+    name: str
+    level: str
+    text: str
 
 
 class Noticed:

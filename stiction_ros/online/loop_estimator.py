@@ -13,13 +13,14 @@ from stiction_ros.identification import Identification
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.handover.hand_over import AtOnce
-from stiction_ros.online.input.port_health import Notice
+from stiction_ros.online.health import Notice
 from stiction_ros.online.input.samples import picked
 from stiction_ros.online.monitor.gap_finding import GapFinding
 from stiction_ros.online.monitor.gap_monitor import GapLook
 from stiction_ros.online.monitor.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.online.pairing import NEW_RUN, PairedSample
+from stiction_ros.records import Record
 from stiction_ros.texts import json_text
 
 SECOND = 10**9
@@ -104,7 +105,7 @@ class LoopEstimator:
         self.monitoring: Monitoring | None = None
         self.tags: dict[str, tuple[str, ...]] = {"pv": (), "op": ()}
         self.first: int | None = None
-        self._pending: deque[tuple[int, Future[Identification]]] = deque()
+        self._pending: deque[tuple[int, Record, Future[Identification]]] = deque()
         self._strange: Counter[tuple[str, ...]] = Counter()
 
     def retune(self, settings: EstimatorNodeSettings) -> None:
@@ -167,7 +168,7 @@ class LoopEstimator:
         record = self.live.add(found.sample, found.op, found.pv)
         if record is not None:
             future = self._submit(self._fitter, record, self.live.options())
-            self._pending.append((found.sample, future))
+            self._pending.append((found.sample, record, future))
             told += self.collect()
         look = self.monitoring.add(found.sample, found.op, found.pv)
         return [*told, *([] if look is None else [look]), *self.collect()]
@@ -190,23 +191,25 @@ class LoopEstimator:
         told: list[Told] = []
         if self.live is None or self.monitoring is None:
             return told
-        while self._pending and self._pending[0][1].done():
-            end, future = self._pending.popleft()
-            if future.cancelled():
-                self.live.drop(end)
-            else:
-                told.append(self._concluded(self.live, self.monitoring, end, future))
+        while self._pending and self._pending[0][2].done():
+            end, record, future = self._pending.popleft()
+            if not future.cancelled():
+                told.append(self._concluded(end, record, future, self.live, self.monitoring))
         return told + list(self.monitoring.collect())
 
     def _concluded(
-        self, live: LiveEstimator, monitoring: Monitoring, end: int, future: Future[Identification]
+        self,
+        end: int,
+        record: Record,
+        found: Future[Identification],
+        live: LiveEstimator,
+        monitoring: Monitoring,
     ) -> Fit:
         stamp, text = self.pairs.stamp_of(end), ""
         try:
-            update = live.conclude(end, future.result())
+            update = live.conclude(end, found.result(), record)
             monitoring.learn(update)
         except Exception as error:  # one fit that fails must not end the estimator
-            live.drop(end)
             return Fit(end, stamp, self.token, error=error)
         if update.loop_model is not None:
             step = round(self.settings.sample_time * SECOND)

@@ -6,22 +6,15 @@ from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.estimator.live import EstimatorSettings
 from stiction_ros.online.monitor.gap_monitor import MonitorRule
 from stiction_ros.online.pairing import BRIDGED, Pairing
-from stiction_ros.online.plain_settings import PACES, SPEED, NodeSettings, speed_setting
+from stiction_ros.online.plain_settings import PacedSettings
 from stiction_ros.settings import setting
 
 
 @dataclasses.dataclass(frozen=True)
-class ControllerNodeSettings(LiveControllerSettings, NodeSettings):
+class ControllerNodeSettings(LiveControllerSettings, PacedSettings):
     """The live controller's settings and what belongs to the node."""
 
     model: str = setting("", "loop model file the controller is built from", fixed=True)
-    pace: str = setting(
-        "lockstep",
-        "lockstep holds op until an awaited fit is there; realtime does not",
-        choices=PACES,
-        fixed=True,
-    )
-    speed: float = speed_setting(f"{SPEED}, as of the plant")
     sp_source: str = setting(
         "schedule",
         "schedule: in lockstep each pv has its own sp; external: the last (transient local) holds",
@@ -35,18 +28,11 @@ class ControllerNodeSettings(LiveControllerSettings, NodeSettings):
 
 
 @dataclasses.dataclass(frozen=True)
-class EstimatorNodeSettings(EstimatorSettings, MonitorRule, NodeSettings):
+class EstimatorNodeSettings(EstimatorSettings, MonitorRule, PacedSettings):
     """The live estimator's settings, those of the monitor, and what belongs to the node."""
 
     loop: str = setting("loop", "name of the loop, for the models it publishes", fixed=True)
     sample_time: float = setting(1.0, "seconds between two samples", low=1e-6, fixed=True)
-    pace: str = setting(
-        "lockstep",
-        "lockstep: ends with the plant; realtime: waits for it to come back",
-        choices=PACES,
-        fixed=True,
-    )
-    speed: float = speed_setting()
     monitor_model: str = setting(
         "",
         "loop model file the monitor compares with; empty for the loop as it is identified",

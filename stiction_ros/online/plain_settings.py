@@ -5,18 +5,9 @@ identification.
 """
 
 import dataclasses
-from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.settings import setting
-
-PACES = ("lockstep", "realtime")
-SPEED = "simulated seconds per second of realtime pace"
-
-
-def speed_setting(description: str = SPEED) -> Any:
-    """Declare the speed, which has no effect in lockstep."""
-    return setting(1.0, description, low=1e-3, high=1e6, beside=("pace", "realtime"))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,7 +24,27 @@ class NodeSettings:
 
 
 @dataclasses.dataclass(frozen=True)
-class PlantNodeSettings(NodeSettings):
+class PacedSettings(NodeSettings):
+    """By what a node of a running loop goes on from one sample to the next."""
+
+    pace: str = setting(
+        "lockstep",
+        "lockstep waits for what a sample needs, its op or an awaited fit, and ends with the "
+        "plant; realtime waits for nobody",
+        choices=("lockstep", "realtime"),
+        fixed=True,
+    )
+    speed: float = setting(
+        1.0,
+        "simulated seconds per second of realtime pace, as of the plant",
+        low=1e-3,
+        high=1e6,
+        beside=("pace", "realtime"),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class PlantNodeSettings(PacedSettings):
     """What the plant simulates, how long and how fast."""
 
     model: str = setting("", "loop model file, *.loop.yaml", fixed=True)
@@ -54,13 +65,6 @@ class PlantNodeSettings(NodeSettings):
         "valve TAG.SP is the set-point of output TAG; empty for one loop of all tags",
         fixed=True,
     )
-    pace: str = setting(
-        "lockstep",
-        "lockstep waits for the op of each sample; realtime does not",
-        choices=PACES,
-        fixed=True,
-    )
-    speed: float = speed_setting()
     commander: str = setting(
         "controller",
         "the only node whose op is taken, as it names itself in frame_id; without a leading "

@@ -277,11 +277,12 @@ def test_two_commanders_are_an_error_that_names_both(bench: Bench) -> None:
     publisher = stranger.create_publisher(JointState, "op", SIGNAL_QOS)
 
     def said() -> str:
-        bench.node._look_at_graph()
+        bench.node._looks = 0
+        bench.node.look()
         bench.graph.spin_some(1)
         return bench.node.noticed.text
 
-    bench.graph.spin_until(said, "the second commander")
+    bench.graph.spin_until(lambda: "op is published by" in said(), "the second commander")
     assert "/controller" in said()
     assert "/stranger" in said()
     assert bench.status().level == ERROR

@@ -303,7 +303,7 @@ class ManagedNode(LifecycleNode):
             for parameter in parameter_list:
                 parameters.check_known(self, parameter.name)
         except InputError as error:
-            return parameters.refusal(error)
+            return parameters.answer(str(error))
         return super().set_parameters_atomically(parameter_list)
 
     def _on_set(self, wanted: list[Any]) -> Any:
@@ -314,9 +314,9 @@ class ManagedNode(LifecycleNode):
             if self._configured and settings is not self.settings:
                 self.retune(settings)
         except InputError as error:
-            return parameters.refusal(error)
+            return parameters.answer(str(error))
         self.settings = settings
-        return parameters.accepted()
+        return parameters.answer()
 
     # ---- diagnostics -----------------------------------------------------------------------
 

@@ -66,14 +66,9 @@ def check_known(node: Node, name: str) -> None:
         )
 
 
-def refusal(error: InputError) -> SetParametersResult:
-    """Return the answer that leaves the old value in force."""
-    return SetParametersResult(successful=False, reason=str(error))
-
-
-def accepted() -> SetParametersResult:
-    """Return the answer that takes the new values."""
-    return SetParametersResult(successful=True)
+def answer(refusal: str = "") -> SetParametersResult:
+    """Return the answer that takes the new values, or says why the old ones stay in force."""
+    return SetParametersResult(successful=not refusal, reason=refusal)
 
 
 def as_mapping(settings: Any) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -119,6 +120,19 @@ def _noise_of(
     return OutputReference(model, noise.ar, std) if 0.0 < std < math.inf else None
 
 
+class LeadIn(NamedTuple):
+    """Samples before a change, and where the stems were."""
+
+    op: FloatArray  # op, stem: shape (n, m), %
+    stem: FloatArray
+    pv: FloatArray  # shape (n, p)
+
+    @classmethod
+    def last_of(cls, op: FloatArray, stem: FloatArray, pv: FloatArray) -> "LeadIn":
+        """Return the last samples of longer signals, as many as are of use."""
+        return cls(*(signal[-2 * START_ROWS :].copy() for signal in (op, stem, pv)))
+
+
 @dataclasses.dataclass(frozen=True)
 class Share:
     """How much of a signature a stretch of samples shows: 0 nothing of it, 1 all."""
@@ -175,6 +189,10 @@ class Evidence:
                 for j, valve in enumerate(reference.valves)
             ]
             self._gains.append(np.column_stack(gains))
+
+    def lead_in(self, end: int) -> LeadIn:
+        """Return what is of use of the samples before one of the window."""
+        return LeadIn.last_of(self.op[:end], self.stem[:end], self.pv[:end])
 
     def stems(self, valve: int, first: int, grid: FloatArray) -> FloatArray:
         """Return stems of ``valve`` by its law from ``first`` on, shape (n − first, G), %.

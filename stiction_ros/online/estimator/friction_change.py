@@ -69,20 +69,6 @@ class ChangeRule:
 
 
 @dataclasses.dataclass(frozen=True)
-class LeadIn:
-    """Samples before a change, and where the stems were."""
-
-    op: FloatArray  # op, stem: shape (n, m), %
-    stem: FloatArray
-    pv: FloatArray  # shape (n, p)
-
-    @classmethod
-    def last_of(cls, op: FloatArray, stem: FloatArray, pv: FloatArray) -> "LeadIn":
-        """Return the last samples of longer signals, as many as are of use."""
-        return cls(*(signal[-2 * START_ROWS :].copy() for signal in (op, stem, pv)))
-
-
-@dataclasses.dataclass(frozen=True)
 class FrictionChange:
     """The verdict on one valve."""
 
@@ -92,9 +78,6 @@ class FrictionChange:
     friction: TrustedFriction | None = None  # with intervals; None when unchanged or serviced
     doubted: bool = False  # whether the window speaks against the trusted friction, if not enough
     explained: bool = False  # whether process and trusted friction explain the window
-    share: Share | None = None  # of the new friction's signature, None where nothing was measured
-    # the window up to the change, None when unchanged
-    before: LeadIn | None = dataclasses.field(default=None, compare=False, repr=False)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,11 +109,9 @@ def look_for_change(
     if share is not None and _agrees(rule, share) and serviced.gain > SUSPICION:
         low, rest = _rivals(evidence, valve, trusted, serviced.first)
         if low >= LIKELY and rest - max(low, serviced.gain) <= RIVAL:
-            return _from(evidence, serviced.first, ChangeStatus.SERVICED, name, None, share)
+            return FrictionChange(ChangeStatus.SERVICED, name, len(evidence.op) - serviced.first)
     explained = evidence.mean_square <= EXPLAINED
-    return FrictionChange(
-        ChangeStatus.UNCHANGED, name, doubted=doubted, explained=explained, share=share
-    )
+    return FrictionChange(ChangeStatus.UNCHANGED, name, doubted=doubted, explained=explained)
 
 
 def static_interval(
@@ -276,20 +257,7 @@ def _changed(
         return None  # the last: perhaps it is serviced, which more moves must show
     new = trusted.narrowed((low, high), best[1], _around(best[1], error), anew=True)
     name = evidence.reference.valves[valve]
-    return _from(evidence, found.first, ChangeStatus.CHANGED, name, new, share)
-
-
-def _from(
-    evidence: Evidence,
-    first: int,
-    status: ChangeStatus,
-    name: str,
-    friction: TrustedFriction | None,
-    share: Share,
-) -> FrictionChange:
-    before = LeadIn.last_of(evidence.op[:first], evidence.stem[:first], evidence.pv[:first])
-    samples = len(evidence.op) - first
-    return FrictionChange(status, name, samples, friction, share=share, before=before)
+    return FrictionChange(ChangeStatus.CHANGED, name, len(evidence.op) - first, new)
 
 
 def _refined_dynamic(

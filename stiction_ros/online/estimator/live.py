@@ -15,12 +15,11 @@ from stiction_ros.identification.friction import find_law
 from stiction_ros.identification.identification_options import AUTO
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.member_loops import is_set_point
-from stiction_ros.online.estimator.change_evidence import LEAST_ROWS, Evidence, Reference
+from stiction_ros.online.estimator.change_evidence import LEAST_ROWS, Evidence, LeadIn, Reference
 from stiction_ros.online.estimator.friction_change import (
     ChangeRule,
     ChangeStatus,
     FrictionChange,
-    LeadIn,
     look_for_change,
     narrowed,
 )
@@ -128,7 +127,6 @@ class LiveEstimator:
     Attributes:
         settings: in force.
         loop, valves, outputs, sample_time: of the loop; seconds.
-        published_model: the loop model of the last fit that had a new one.
     """
 
     def __init__(
@@ -144,12 +142,10 @@ class LiveEstimator:
         self.settings = settings
         self.loop, self.sample_time = loop, sample_time
         self.valves, self.outputs = tuple(valves), tuple(outputs)
-        self.published_model: LoopModel | None = None
         self._trust = {name: ValveTrust(settings) for name in self.valves}
         self._op: deque[FloatArray] = deque(maxlen=settings.window)
         self._pv: deque[FloatArray] = deque(maxlen=settings.window)
         self._published: Mapping[str, TrustedFriction] = {}
-        self._waiting: dict[int, Record] = {}  # windows that are being fitted, by their end
         self._last = -1
         self._reference: Reference | None = None
         self._anchor: tuple[int, LeadIn] | None = None  # where the window began anew
@@ -188,7 +184,7 @@ class LiveEstimator:
             self.restart()
         if not self.settings.due(sample):
             return None
-        record = Record(
+        return Record(
             self.loop,
             self.sample_time,
             self.valves,
@@ -197,8 +193,6 @@ class LiveEstimator:
             np.array(self._pv).reshape(-1, len(self.outputs)),
             start=(sample + 1 - len(self._op)) * self.sample_time,
         )
-        self._waiting[sample] = record
-        return record
 
     def restart(self) -> None:
         """Empty the window, as after samples that were missed; trust is kept."""
@@ -206,18 +200,12 @@ class LiveEstimator:
         self._pv.clear()
         self._anchor = self._seen = None
 
-    def drop(self, end: int) -> None:
-        """Forget the window that ends at sample ``end``, whose fit has failed."""
-        self._waiting.pop(end, None)
+    def conclude(self, end: int, found: Identification, record: Record | None = None) -> FitUpdate:
+        """Apply the rule of trust to the fit of the window ``record`` that ends at ``end``.
 
-    def conclude(self, end: int, found: Identification) -> FitUpdate:
-        """Apply the rule of trust to the fit of the window that ends at sample ``end``.
-
-        First the window is asked whether a trusted friction has changed. If so, the new one is
-        trusted, and the window begins anew at the change, so that no fit mixes the two.
+        First the window, where it is given, is asked whether a trusted friction has changed. If so,
+        the new one is trusted, and the window begins anew at the change: no fit mixes the two.
         """
-        record = self._waiting.pop(end, None)
-        self._waiting = {k: r for k, r in self._waiting.items() if k > end}
         known = self.trusted
         changes = () if record is None else self._look(end, record)
         happened = [c for c in changes if c.status is not ChangeStatus.UNCHANGED]
@@ -236,7 +224,7 @@ class LiveEstimator:
             if self._young(end) and self._reference is not None:
                 outputs = tuple(output.model for output in self._reference.outputs)
             model = self._describe(FitUpdate(end, found, trusted, None), outputs)
-            self._published, self.published_model = trusted, model
+            self._published = trusted
         return FitUpdate(end, found, trusted, model, changes)
 
     def _judge(self, found: Identification, changes: Sequence[FrictionChange]) -> None:
@@ -285,8 +273,7 @@ class LiveEstimator:
         before = None
         seen, since = self._seen, 0 if self._seen is None else begin - self._seen[0]
         if self._anchor is not None and self._anchor[0] < begin and seen is not None and since > 0:
-            rows = (seen[1].op, seen[1].stem, seen[1].pv)  # the window has slid over its anchor
-            self._anchor = begin, LeadIn.last_of(*(signal[:since] for signal in rows))
+            self._anchor = begin, seen[1].lead_in(since)  # the window has slid over its anchor
         if self._anchor is not None and begin <= self._anchor[0] <= end:
             record, before = record.part(self._anchor[0] - begin, len(record)), self._anchor[1]
         if not len(record):
@@ -323,9 +310,9 @@ class LiveEstimator:
         first = end + 1 - change.samples
         self._trust[change.valve].renew(change.friction)
         self._changed[change.valve] = _Change(change.status, first)
-        self._anchor = self._seen = None
-        if change.before is not None and len(change.before.op):
-            self._anchor = first, change.before
+        seen, self._anchor, self._seen = self._seen, None, None
+        if seen is not None and len(seen[1].op) > change.samples:
+            self._anchor = first, seen[1].lead_in(len(seen[1].op) - change.samples)
         for signal in (self._op, self._pv):
             kept = list(signal)[max(len(signal) - (self._last + 1 - first), 0) :]
             signal.clear()

@@ -1,12 +1,11 @@
 """What the state of an input port means for the health of its node."""
 
 from collections import Counter
-from typing import NamedTuple
 
+from stiction_ros.online.health import Notice, stopped_after
 from stiction_ros.online.input.samples import PortState
 
-STOPPED = 3  # samples without a PV after which the loop has stopped
-LEAST = 0.5  # s that a PV may be late at least
+WAITING = 3  # PVs after which a run should have begun
 LOCKSTEP = 5.0  # s: a plant in lockstep shows its sample again every second
 
 # What is counted -> how it is said; the others are the usual course of a run.
@@ -30,14 +29,6 @@ SAID = {
 }
 
 
-class Notice(NamedTuple):
-    """One thing to be noticed: its name, warn or error, and a sentence."""
-
-    name: str
-    level: str
-    text: str
-
-
 class PortHealth:
     """Says at each look what is wrong now, or has happened since the last look."""
 
@@ -49,11 +40,11 @@ class PortHealth:
     def look(self, state: PortState, running: float) -> list[Notice]:
         """Return what to notice; what never came is as old as the node, ``running`` s."""
         found = []
-        longest = LOCKSTEP if self._lockstep else max(STOPPED * state.period, LEAST)
+        longest = LOCKSTEP if self._lockstep else stopped_after(state.period)
         age = min(state.ages.get("pv", running), running)
         if age > longest:
             found.append(Notice("pv", "error", f"no pv for {age:.1f} s"))
-        elif state.lacks and state.waiting >= STOPPED:
+        elif state.lacks and state.waiting >= WAITING:
             found.append(Notice("start", "error", f"nothing is stepped, {state.lacks} lacks"))
         told = state.ages.get("op_applied")
         if told is not None and told > longest >= age:

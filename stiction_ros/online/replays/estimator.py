@@ -12,7 +12,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification.friction import find_law
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.live import fit
-from stiction_ros.online.input.port_health import Notice
+from stiction_ros.online.health import Notice
 from stiction_ros.online.loop_estimator import Fit, LoopEstimator
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.online.replays.bag import DOCUMENTS, ReplayBag, read_status

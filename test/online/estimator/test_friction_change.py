@@ -110,8 +110,6 @@ def test_a_serviced_valve_shows_in_its_kicks(new: HeStiction | None, gain: float
     assert found.status is ChangeStatus.SERVICED
     assert found.friction is None
     assert found.samples == pytest.approx(SAMPLES - CHANGE, abs=16)
-    assert found.share is not None
-    assert found.share.value == pytest.approx(1.0, abs=0.3)
 
 
 def test_a_few_moves_are_not_enough() -> None:
@@ -121,7 +119,9 @@ def test_a_few_moves_are_not_enough() -> None:
 
 
 def test_nobody_looks_where_no_moves_are_asked_for() -> None:
-    assert look(evidence(kicks(5.5, 9.0), None), ChangeRule(change_moves=0)).share is None
+    assert look(evidence(kicks(5.5, 9.0), None), ChangeRule(change_moves=0)).status is (
+        ChangeStatus.UNCHANGED
+    )
 
 
 @pytest.mark.parametrize(
@@ -142,8 +142,6 @@ def test_a_valve_that_stays_where_it_should_have_moved_sticks_more(
     assert low <= 7.5 <= high
     assert high <= widest * low
     assert found.friction.dynamic_friction == pytest.approx(new.dynamic_friction, abs=0.25)
-    assert found.before is not None
-    assert len(found.before.op) <= SAMPLES - found.samples
 
 
 @pytest.mark.parametrize("kind", [KanoStiction, ChoudhuryStiction, XchStiction])
