@@ -81,7 +81,6 @@ class LoopEstimator:
         settings: EstimatorNodeSettings,
         watched: LoopModel | None = None,
         submit: Callable[..., "Future[Any]"] | None = None,
-        fitter: Callable[..., Identification] = fit,
     ) -> None:
         """Start empty.
 
@@ -89,11 +88,10 @@ class LoopEstimator:
             settings: of estimator and monitor; those that no fit can use are refused.
             watched: what the monitor compares with; None for the loop as it is identified.
             submit: runs a function beside the loop, one after the other; None does it at once.
-            fitter: makes one fit.
         """
         settings.options()
         self.settings, self._watched = settings, watched
-        self._submit, self._fitter = submit or AtOnce().submit, fitter
+        self._submit = submit or AtOnce().submit
         self.refused: Counter[str] = Counter()
         self.samples = self.stamp = 0
         self.token = ""
@@ -167,7 +165,7 @@ class LoopEstimator:
         self.stamp, self.samples = found.stamp, found.sample + 1
         record = self.live.add(found.sample, found.op, found.pv)
         if record is not None:
-            future = self._submit(self._fitter, record, self.live.options())
+            future = self._submit(fit, record, self.live.options())
             self._pending.append((found.sample, record, future))
             told += self.collect()
         look = self.monitoring.add(found.sample, found.op, found.pv)

@@ -20,7 +20,6 @@ from stiction_ros.texts import finite
 
 PARAMETER_EVENT = "rcl_interfaces/msg/ParameterEvent"
 _INPUTS = ("pv", "op", "op_applied", "sp", "dv")
-_TEXTS = ("config", "loop_model")
 DOCUMENTS = ("identification", "look", "finding")
 _KIND_BY_PARAMETER = {"confirmations": "estimator", "horizon": "controller"}
 
@@ -47,8 +46,7 @@ class Signal:
 class PublishedModel:
     """One message of ``loop_model``, and how many ``op`` came before it in the bag."""
 
-    text: str
-    valid_from: int
+    document: Mapping[str, Any]
     ops_before: int
 
 
@@ -75,7 +73,7 @@ class ReplayBag:
     fits: Mapping[int, dict[str, Any]]
     # likewise the statuses in ``/diagnostics``, by the key of their document (:data:`DOCUMENTS`)
     told: Mapping[str, Mapping[int, dict[str, Any]]]
-    models: tuple[PublishedModel, ...]  # messages of ``loop_model`` in their order
+    models: Mapping[str, PublishedModel]  # messages of ``loop_model`` by ``valid_from``, as text
     modes: tuple[events.ModeChange, ...]  # changes of mode in ``/diagnostics``, with the first mode
     # a stamp in ns and how many samples the estimator had taken in up to it; None when the bag does
     # not tell
@@ -115,7 +113,7 @@ def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> Replay
             key: {end: read_status(keys) for end, keys, _ in events.documents(inside, key)}
             for key in DOCUMENTS
         },
-        models=tuple(_models(inside)),
+        models=dict(_models(inside)),
         modes=events.mode_changes(inside),
         counted=_counted(inside, configs.get("estimator")),
         notes=tuple(notes),
@@ -124,11 +122,8 @@ def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> Replay
 
 def _wanted(topic: BagTopic) -> bool:
     name = last_part(topic.name)[1]
-    return (
-        (topic.type == JOINT_STATE and name in (*_INPUTS, "stiction"))
-        or (topic.type == events.STRING and name in _TEXTS)
-        or topic.type in (events.DIAGNOSTICS, PARAMETER_EVENT)
-    )
+    signal = topic.type == JOINT_STATE and name in _INPUTS
+    return signal or events.tells_of_run(topic) or topic.type == PARAMETER_EVENT
 
 
 def _loop(messages: Iterable[BagMessage], namespace: str | None, where: str) -> str:
@@ -188,17 +183,15 @@ def read_status(keys: Mapping[str, str]) -> dict[str, Any]:
     return read
 
 
-def _models(messages: Iterable[BagMessage]) -> Iterator[PublishedModel]:
+def _models(messages: Iterable[BagMessage]) -> Iterator[tuple[str, PublishedModel]]:
     ops: set[int] = set()  # stamps: a sample that was shown again was answered again
     for message in messages:
         name = last_part(message.topic)[1]
         if message.type == JOINT_STATE and name == "op":
             ops.add(stamp_ns(message.message))
         elif message.type == events.STRING and name == "loop_model":
-            text = str(message.message.data)
-            document = mapping_of(text)
-            valid_from = document.get("valid_from", 0)
-            yield PublishedModel(text, valid_from if isinstance(valid_from, int) else 0, len(ops))
+            document = mapping_of(str(message.message.data))
+            yield str(document.get("valid_from", 0)), PublishedModel(document, len(ops))
 
 
 def _configs(messages: Iterable[BagMessage], space: str, notes: list[str]) -> dict[str, NodeConfig]:

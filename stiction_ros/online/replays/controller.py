@@ -8,7 +8,6 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.controller.testing import ValveTestingController
 from stiction_ros.online.input.op_port import Given
 from stiction_ros.online.input.port import LONGEST_GAP
@@ -19,14 +18,6 @@ from stiction_ros.online.node_settings import ControllerNodeSettings
 from stiction_ros.online.replays.bag import ReplayBag
 from stiction_ros.online.replays.result import Comparison
 from stiction_ros.records.run.events import ModeChange, without_repeats
-
-
-@dataclasses.dataclass(frozen=True)
-class Offer:
-    """A loop model for the controller: its YAML, and the sample of the run that it is for."""
-
-    text: str
-    sample: int
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,13 +33,13 @@ def replay_controller(
     bag: ReplayBag,
     settings: ControllerNodeSettings,
     model: LoopModel,
-    offers: tuple[Offer, ...],
+    offers: tuple[tuple[str, int], ...],
     origin: int,
 ) -> ReplayedControl:
     """Step the controller over the recorded ``pv``, ``op_applied``, ``sp`` and ``dv``.
 
-    Settings and model are those of the node, ``offers`` loop models in order; ``origin`` is the
-    stamp of sample 0 of the run, ns.
+    Settings and model are those of the node. The ``offers`` are texts of loop models in order, each
+    with the sample that it is for; ``origin`` is the stamp of sample 0 of the run, ns.
     """
     live = ValveTestingController(settings, model)
     recorded = _by_stamp(bag, "op", model.valve_names)
@@ -62,8 +53,12 @@ def replay_controller(
         if first is None:
             first = (sample.stamp - origin + step // 2) // step
         now = first + sample.number
-        while waiting and waiting[0].sample <= now:
-            _offer(live, waiting.pop(0), first, notes)
+        while waiting and waiting[0][1] <= now:
+            text, due = waiting.pop(0)
+            try:
+                live.offer(LoopModel.from_yaml(text, "loop_model"), due - first)
+            except InputError as error:
+                notes.append(f"the model for sample {due} is refused: {error}")
         told = len(live.changes) if changes else 0
         result = live.take(sample)
         if result is None:
@@ -78,13 +73,6 @@ def replay_controller(
     own = {stamp: tuple(op.tolist()) for stamp, op in recorded.items() if stamp in replayed}
     op = Comparison.of(lambda at: f"op at {(at - origin) / SECOND:.9g} s", own, replayed)
     return ReplayedControl(without_repeats(changes), op, tuple(notes))
-
-
-def _offer(live: LiveController, offer: Offer, first: int, notes: list[str]) -> None:
-    try:
-        live.offer(LoopModel.from_yaml(offer.text, "loop_model"), offer.sample - first)
-    except InputError as error:
-        notes.append(f"the model for sample {offer.sample} is refused: {error}")
 
 
 def _samples(

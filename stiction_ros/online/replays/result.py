@@ -52,7 +52,7 @@ class FitMatch:
     """One fit, replayed and recorded."""
 
     fit: Fit  # of the replay
-    whole: bool  # whether the bag holds the whole window; otherwise the recorded fit stands in
+    whole: bool  # whether the bag holds the whole window
     match: Match  # equal in every bit, different, or not compared
     difference: str  # the first difference, or why it is not compared; empty when equal
 
@@ -65,12 +65,11 @@ class ModeMatch:
     replayed: tuple[ModeChange, ...]
     match: Match  # equal when stamps, modes, models, reasons and frictions are
     difference: str  # the first difference, or why nothing is compared; empty when equal
-    before: str = ""  # mode in force when a bag that begins late begins; empty otherwise
 
     @property
     def swaps(self) -> tuple[ModeChange | None, ModeChange | None]:
         """The swap that was recorded and the replayed one."""
-        return swap_of(self.recorded, self.before), swap_of(self.replayed, self.before)
+        return swap_of(self.recorded), swap_of(self.replayed)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,8 +93,9 @@ class Replay:
     from_first_sample: bool  # whether the bag holds the run from its first sample
     samples: int  # of the run up to the end of the bag
     fits: tuple[FitMatch, ...]  # every fit that was due within the bag
-    modes: ModeMatch | None  # None when the bag has no configuration of a controller
-    op: Comparison | None  # None likewise, and for a bag that begins later than the run
+    # modes, op: None without a configuration of a controller, and for a bag that begins late
+    modes: ModeMatch | None
+    op: Comparison | None
     notes: tuple[str, ...]  # what stands in the way of equality, one sentence each
     monitor: MonitorMatch | None = None  # None when the estimator ran without monitor
 

@@ -1,6 +1,6 @@
 """A recorded run once more without ROS, held against what was published live."""
 
-import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -10,7 +10,7 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.online.loop_estimator import SECOND, Fit
 from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
 from stiction_ros.online.replays.bag import NodeConfig, ReplayBag, fit_told, read_replay_bag
-from stiction_ros.online.replays.controller import Offer, ReplayedControl, replay_controller
+from stiction_ros.online.replays.controller import ReplayedControl, replay_controller
 from stiction_ros.online.replays.estimator import Progress, ReplayedEstimates, replay_estimator
 from stiction_ros.online.replays.result import (
     Comparison,
@@ -22,6 +22,7 @@ from stiction_ros.online.replays.result import (
     first_difference,
 )
 from stiction_ros.records.bag.run_metadata import mapping_of
+from stiction_ros.records.run.events import ModeChange
 from stiction_ros.settings import from_mapping
 
 T = TypeVar("T")
@@ -34,8 +35,8 @@ def replay(
 
     The settings are those that the nodes told on ``~/config``. In lockstep, a bag that holds
     the run from its first sample gives every published number again, bit for bit. A bag that
-    begins later gives equal fits from the first window that lies in it as a whole; of the
-    windows before, the recorded fits are taken in, and ``op`` is not compared.
+    begins later gives equal fits from the first window that lies in it as a whole; what is trusted
+    after them, ``op`` and modes are not compared.
 
     Args:
         path: a rosbag2 directory or a ``.mcap`` file.
@@ -61,15 +62,17 @@ def replay(
         watched = LoopModel.from_mapping(dict(bag.estimator.model), where)
     estimator = replay_estimator(bag, settings, origin, watched, progress)
     whole = origin >= first
-    known = _trust_is_known(bag, estimator)
-    fits = tuple(_match_fit(bag, estimator, fit, known) for fit in estimator.fits)
+    window = 0 if whole else settings.window
+    fits = tuple(_match_fit(bag, estimator, fit, window) for fit in estimator.fits)
     notes += _remarks(bag)
     if estimator.missed:
         notes.append(f"{estimator.missed} samples are missing within the bag")
     if not whole:
-        notes.append(_late_start(estimator, fits, known))
-    control = _control(bag, estimator, origin, first, str(path))
-    modes = None if control is None else _match_modes(bag, control, first, whole, known)
+        notes.append(
+            f"the bag begins at sample {estimator.first} of the run: fits are compared from the "
+            "first whole window on, what is trusted after them, op and modes are not"
+        )
+    control = _control(bag, estimator, str(path)) if whole else None
     notes += () if control is None else control.notes
     return Replay(
         bag=bag,
@@ -77,10 +80,10 @@ def replay(
         from_first_sample=whole,
         samples=estimator.samples,
         fits=fits,
-        modes=modes,
-        op=None if control is None or not whole else control.op,
+        modes=None if control is None else _match_modes(bag.modes, control.changes),
+        op=None if control is None else control.op,
         notes=tuple(notes),
-        monitor=_match_monitor(bag, estimator),
+        monitor=_match_monitor(bag, estimator) if settings.monitor else None,
     )
 
 
@@ -97,98 +100,64 @@ def _origin(bag: ReplayBag, settings: EstimatorNodeSettings, first: int) -> tupl
     return stamp - (count - 1) * round(settings.sample_time * SECOND), []
 
 
-def _control(
-    bag: ReplayBag, estimator: ReplayedEstimates, origin: int, first: int, where: str
-) -> ReplayedControl | None:
+def _control(bag: ReplayBag, estimator: ReplayedEstimates, where: str) -> ReplayedControl | None:
     """Replay the controller on the replayed loop models; None without its configuration."""
     config = bag.controller
     if config is None or config.model is None:
         return None
     settings = _settings(ControllerNodeSettings, config, where)
     model = LoopModel.from_mapping(dict(config.model), f"{where}: {config.node}/config: model")
-    offers = _offers(bag, estimator, first, round(model.sample_time * SECOND))
+    step, origin = round(model.sample_time * SECOND), estimator.origin
+    came = {token: model.ops_before for token, model in bag.models.items()}
+    offers = tuple(
+        (fit.model_text, max((int(fit.token) - origin) // step, came.get(fit.token, 0)))
+        for fit in estimator.fits
+        if fit.model_text
+    )
     return replay_controller(bag, settings, model, offers, origin)
 
 
-def _offers(
-    bag: ReplayBag, estimator: ReplayedEstimates, first: int, step: int
-) -> tuple[Offer, ...]:
-    """Return the recorded loop models of fits before the bag, then the replayed ones."""
-    origin, latency = estimator.origin, estimator.settings.fit_latency * step
-    begin = max((first - origin) // step, 0)
-    came = {model.valid_from: model.ops_before + begin for model in bag.models}
-    earlier = [m for m in bag.models if m.valid_from - latency < first]
-    replayed = [fit for fit in estimator.fits if fit.model_text]
-    texts = [(m.text, m.valid_from) for m in earlier]
-    texts += [(fit.model_text, int(fit.token)) for fit in replayed]
-    return tuple(
-        Offer(text, max((valid_from - origin) // step, came.get(valid_from, 0), begin))
-        for text, valid_from in texts
-    )
+def _match_fit(bag: ReplayBag, estimator: ReplayedEstimates, fit: Fit, window: int) -> FitMatch:
+    """Compare one fit with ``stiction``, and with what is told of it in ``/diagnostics``.
 
-
-def _trust_is_known(bag: ReplayBag, estimator: ReplayedEstimates) -> bool:
-    """Return whether trust was built on every fit of the run."""
-    fits, first = estimator.fits, estimator.settings.fit_first - 1
-    unusable = {stamp for stamp, told in bag.fits.items() if not told["stiction"]}
-    return bool(fits and fits[0].end == first) and all(
-        fit.update is not None or fit.stamp in unusable
-        for fit in fits
-        if fit.end in estimator.partial
-    )
-
-
-def _match_fit(bag: ReplayBag, estimator: ReplayedEstimates, fit: Fit, known: bool) -> FitMatch:
-    """Compare one fit with ``stiction``, ``loop_model`` and the fit told in ``/diagnostics``.
-
-    Where trust was not built on all fits of the run, what is trusted after it is not compared.
+    In a bag that begins late the fit itself, where the bag holds its ``window``, in samples; that
+    is 0 for a bag of the whole run, in which also what is trusted after the fit is compared.
     """
-    if fit.end in estimator.partial:
-        taken = "" if fit.update is None else ", the recorded fit is taken"
-        return FitMatch(fit, False, Match.NOT_COMPARED, f"window begins before the bag{taken}")
+    if window and max(fit.end + 1 - window, 0) < estimator.first:
+        return FitMatch(fit, False, Match.NOT_COMPARED, "window begins before the bag")
     if fit.stamp not in bag.fits:
         return FitMatch(fit, True, Match.NOT_COMPARED, "not in the bag")
-    published = {str(model.valid_from): model.text for model in bag.models}
-    text = published.get(fit.token, "") if fit.model_text else ""
+    model = bag.models.get(fit.token) if fit.model_text else None
     recorded = bag.fits[fit.stamp] | bag.told["identification"].get(fit.stamp, {})
     replayed = fit_told(fit.rows, fit.token) | estimator.told["identification"].get(fit.stamp, {})
-    recorded["loop_model"] = mapping_of(text) or ""
+    recorded["loop_model"] = "" if model is None else model.document
     replayed["loop_model"] = mapping_of(fit.model_text) or ""
-    if not known:
-        trusted = [key for key in recorded if ".trusted_" in key]
-        for key in ("model in force", "loop_model", *trusted):
-            del recorded[key]
+    if window:
+        known = ("names", "stiction", "identification")
+        recorded = {key: told for key, told in recorded.items() if key in known}
     difference = first_difference(recorded, replayed)
     return FitMatch(fit, True, Match.of(difference), difference)
 
 
-def _match_modes(
-    bag: ReplayBag, control: ReplayedControl, first: int, whole: bool, known: bool
-) -> ModeMatch:
-    """Compare the changes of mode; of a bag that begins late those after its first sample."""
-    after = -math.inf if whole else first
-    both = [tuple(c for c in told if c.stamp > after) for told in (bag.modes, control.changes)]
-    before = control.changes[0].mode if control.changes and not whole else ""
-    why = "" if known or whole else "what was trusted before the bag is not known"
-    if why or not both[0]:
-        why = why or "the bag holds no change of mode"
-        return ModeMatch(both[0], both[1], Match.NOT_COMPARED, why, before)
-    recorded, replayed = (
+def _match_modes(recorded: Sequence[ModeChange], replayed: Sequence[ModeChange]) -> ModeMatch:
+    """Compare the changes of mode, with the time, model, reason and friction of each."""
+    both = tuple(recorded), tuple(replayed)
+    if not recorded:
+        return ModeMatch(*both, Match.NOT_COMPARED, "the bag holds no change of mode")
+    was, found = (
         {f"change {number}": vars(change) for number, change in enumerate(changes, start=1)}
         | {"changes of mode": len(changes)}
         for changes in both
     )
-    difference = first_difference(recorded, replayed)
-    return ModeMatch(both[0], both[1], Match.of(difference), difference, before)
+    difference = first_difference(was, found)
+    return ModeMatch(*both, Match.of(difference), difference)
 
 
-def _match_monitor(bag: ReplayBag, estimator: ReplayedEstimates) -> MonitorMatch | None:
-    """Compare measurements and findings by the end of their window; None without a monitor.
+def _match_monitor(bag: ReplayBag, estimator: ReplayedEstimates) -> MonitorMatch:
+    """Compare measurements and findings by the end of their window.
 
     Of the bag everything must come again; what the node was still looking into is not in it.
     """
-    if not estimator.settings.monitor:
-        return None
     if estimator.first:
         why = "the bag begins after the baseline"
         return MonitorMatch(0, 0, 0, 0, Match.NOT_COMPARED, why)
@@ -222,15 +191,3 @@ def _remarks(bag: ReplayBag) -> list[str]:
     if bag.controller is None:
         notes.append("no configuration of a controller: changes of mode are not replayed")
     return notes
-
-
-def _late_start(estimator: ReplayedEstimates, fits: tuple[FitMatch, ...], known: bool) -> str:
-    begin = f"the bag begins at sample {estimator.first} of the run"
-    compared = next((fit.fit for fit in fits if fit.match is not Match.NOT_COMPARED), None)
-    if compared is None:
-        return f"{begin} and holds no whole window with its fit: no fit is compared, nor op"
-    trust = "trust is built on all of them" if known else "what was trusted before is not known"
-    return (
-        f"{begin}: op is not compared, fits are from the window that ends at "
-        f"{(compared.stamp - estimator.origin) / SECOND:.9g} s, {trust}"
-    )

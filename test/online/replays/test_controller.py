@@ -20,7 +20,7 @@ SETTINGS = {"fit_first": 10**6, "horizon": 30}
 
 
 def bag(signals: list[Signal]) -> ReplayBag:
-    return ReplayBag("run", "", tuple(signals), None, None, {}, {}, (), (), None, ())
+    return ReplayBag("run", "", tuple(signals), None, None, {}, {}, {}, (), None, ())
 
 
 def signal(kind: str, k: int, value: float) -> Signal:
