@@ -222,6 +222,7 @@ class LiveController:
 
         PV (p,) may be NaN, which is missing; DV (d,) as for :meth:`step`.
         """
+        self._settle()  # OP in force is then that of the last sample
         self._observe(self._in_force, pv, dv)
 
     def _observe(self, op: FloatArray, pv: FloatArray, dv: FloatArray | None) -> None:

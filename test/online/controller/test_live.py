@@ -511,13 +511,14 @@ def test_a_run_that_begins_anew_forgets_the_past_and_keeps_the_friction() -> Non
 def test_samples_that_are_passed_over_are_seen_and_keep_op() -> None:
     live, other = LiveController(SETTINGS, PROCESS), LiveController(SETTINGS, PROCESS)
     for one in (live, other):
-        one.step(np.array([50.0]), np.array([50.0]))
+        given = [one.step(np.array([50.0 + k]), np.array([50.0 + 5 * k])).op[0] for k in range(3)]
     for pv in (50.1, 50.3, 50.6):
         live.pass_over(np.array([pv]))
         other.pass_over(np.array([np.nan]))
     moved, blind = (one.step(np.array([51.0]), np.array([50.0])) for one in (live, other))
-    assert live._past.history().op[1:].tolist() == [[50.0]] * 3
-    assert moved.op[0] < 50.0
+    assert given[1] != given[2]
+    assert live._past.history().op[:, 0].tolist() == [*given, *given[2:] * 3]
+    assert moved.op[0] < given[2]
     assert moved.op[0] != blind.op[0]
 
 
