@@ -1,26 +1,22 @@
 """Worker processes of this machine: the engine that needs nothing else.
 
 Workers are forked from one process that has imported what they need, the first of them alone. One
-that is killed is replaced and its loop tried once more. A worker gets its loop when it is ready.
+that is killed is replaced and its loop tried once more. A worker gets its loop when it is ready,
+and ends itself when the loop takes too long.
 """
 
 import contextlib
 import dataclasses
-import math
 import multiprocessing
 import os
 import signal
 import sys
-import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.process import BaseProcess
-from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification.warm_up import compile_loops
-from stiction_ros.intake.loop import Loop
 from stiction_ros.orphans import spared
 from stiction_ros.survey.assess import Assessed, assess
 from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Task, lost
@@ -28,7 +24,6 @@ from stiction_ros.survey.entry import SurveyOptions
 
 LONGEST = 600.0  # seconds that one loop may take; a usual one takes a second or two
 READY = "ready"  # what a worker says once, before its first loop
-SIGNAL = "signal"  # begins how a worker ended that was killed: by chance, or as memory ran out
 ENDS_WITHIN = 2.0  # seconds that a worker is given to end by itself
 
 
@@ -39,16 +34,12 @@ class _Worker:
     task: Task | None = None
     attempt: int = 1
     ready: bool = False
-    since: float = math.inf
 
     def send(self) -> None:
-        """Hand over the loop; its time begins now."""
+        """Hand over the loop."""
         assert self.task is not None
-        self.since = time.monotonic()
-        try:
+        with contextlib.suppress(OSError):  # it has died; that shows when it is waited for
             self.pipe.send(self.task.loop)
-        except (BrokenPipeError, OSError):  # it has died; that shows when it is waited for
-            return
 
 
 class LocalEngine:
@@ -95,61 +86,63 @@ class LocalEngine:
             if worker.process.is_alive():
                 return worker
             self._drop(worker)  # killed while it had nothing to do: no loop's fault
-        context = context_of(__name__)
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload([__name__])
         here, there = context.Pipe()
-        process = started(context, _work, there, options)
+        work = (there, options, self._longest)
+        process = context.Process(target=_work, args=work, daemon=True)
+        with same_imports(), spared():
+            process.start()
         there.close()
         worker = _Worker(process, here)
         self._workers.append(worker)
         return worker
 
     def _give(self, worker: _Worker, task: Task, attempt: int) -> None:
-        worker.task, worker.attempt, worker.since = task, attempt, math.inf
+        worker.task, worker.attempt = task, attempt
         if worker.ready:
             worker.send()
 
     def _gathered(self, options: SurveyOptions) -> Iterator[Done]:
-        """Wait for a worker to be ready, to answer, to die or to take too long."""
-        busy = self._busy
-        end = min(worker.since + self._longest for worker in busy)
-        room = None if end == math.inf else max(end - time.monotonic(), 0.0)
-        speaking = wait([worker.pipe for worker in busy], timeout=room)
-        for worker in busy:
-            task = worker.task
+        """Wait for a worker to be ready, to answer, or to end."""
+        speaking = wait([worker.pipe for worker in self._busy])
+        for worker in [one for one in self._busy if one.pipe in speaking]:
+            answer, task = _answer(worker.pipe), worker.task
             assert task is not None
-            if worker.pipe in speaking:
-                answer = _answer(worker.pipe)
-                if answer == READY:
-                    worker.ready = self._proven = True
-                    worker.send()
-                    continue
-                if isinstance(answer, Assessed):
-                    worker.task = None
-                    yield Done(task, answer)
-                    continue
-                code = self._drop(worker)
-                if not self._proven and not code.startswith(SIGNAL):
-                    raise InputError(
-                        f"no worker process can start, the first ended with {code}",
-                        where="survey",
-                        fix="its message stands above",
-                    )
-                if worker.attempt < ATTEMPTS:
-                    self._give(self._free(options), task, worker.attempt + 1)
-                else:
-                    said = f"its worker ended {ATTEMPTS} times, the last time with {code}"
-                    yield lost(task, said, again=True)
-            elif time.monotonic() >= worker.since + self._longest:
-                self._drop(worker)
-                yield lost(task, f"it took more than {self._longest:g} s and was given up")
+            if answer == READY:
+                worker.ready = self._proven = True
+                worker.send()
+            elif isinstance(answer, Assessed):
+                worker.task = None
+                yield Done(task, answer)
+            else:
+                yield from self._ended(worker, task, options)
 
-    def _drop(self, worker: _Worker) -> str:
-        """End a worker and return how it ended."""
+    def _ended(self, worker: _Worker, task: Task, options: SurveyOptions) -> Iterator[Done]:
+        """Try the loop of a worker that has ended once more, or yield that it is given up."""
+        code = self._drop(worker)
+        said = "no answer" if code is None else f"signal {-code}" if code < 0 else f"code {code}"
+        if code == -signal.SIGALRM:
+            yield lost(task, f"it took more than {self._longest:g} s and was given up")
+        elif not self._proven and (code is None or code >= 0):  # nobody killed it
+            raise InputError(
+                f"no worker process can start, the first ended with {said}",
+                where="survey",
+                fix="its message stands above",
+            )
+        elif worker.attempt < ATTEMPTS:
+            self._give(self._free(options), task, worker.attempt + 1)
+        else:
+            told = f"its worker ended {ATTEMPTS} times, the last time with {said}"
+            yield lost(task, told, again=True)
+
+    def _drop(self, worker: _Worker) -> int | None:
+        """End a worker and return how it ended; None where it did not by itself."""
         self._workers.remove(worker)
-        worker.process.join(timeout=0.2)
+        worker.process.join(timeout=ENDS_WITHIN)
         code = worker.process.exitcode
         _end(worker)
-        return "no answer" if code is None else f"{SIGNAL} {-code}" if code < 0 else f"code {code}"
+        return code
 
     def close(self) -> None:
         """End all workers."""
@@ -179,43 +172,17 @@ def _answer(pipe: Connection) -> Assessed | str | None:
     return answer
 
 
-def _work(pipe: Connection, options: SurveyOptions) -> None:
-    """Judge loops until the pipe closes."""
+def _work(pipe: Connection, options: SurveyOptions, longest: float) -> None:
+    """Judge loops until the pipe closes; one that takes ``longest`` s ends the process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one who asked
     compile_loops((options.identification.method,))
-    try:
+    with contextlib.suppress(EOFError, OSError):  # the other side has gone
         pipe.send(READY)
-    except (BrokenPipeError, OSError):
-        return
-    while True:
-        try:
-            loop: Loop = pipe.recv()
-        except EOFError:
-            return
-        answer = assess(loop, options)
-        try:
+        while pipe.poll(None):
+            signal.setitimer(signal.ITIMER_REAL, longest)
+            answer = assess(pipe.recv(), options)
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
             pipe.send(answer)
-        except (BrokenPipeError, OSError):
-            return
-
-
-def context_of(module: str) -> ForkServerContext | SpawnContext:
-    """Return how processes are started here; a server, if there is one, imports ``module`` once."""
-    if "forkserver" not in multiprocessing.get_all_start_methods():
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([module])
-    return context
-
-
-def started(
-    context: ForkServerContext | SpawnContext, work: Callable[..., None], *arguments: Any
-) -> BaseProcess:
-    """Return a process of a :func:`context_of` that does ``work`` and ends with this one."""
-    process = context.Process(target=work, args=arguments, daemon=True)
-    with same_imports(), spared():
-        process.start()
-    return process
 
 
 @contextlib.contextmanager
