@@ -18,32 +18,6 @@ SHARE, SECONDS = 0.1, 30.0
 """A line is printed after this share of the loops or this time, whichever comes first, where nobody
 looks at a terminal."""
 
-ENDS_WITHIN = 5.0  # seconds that counting is given to end
-
-
-class Counted:
-    """How many loops there are, counted beside the work."""
-
-    def __init__(self, found: Iterable[object]) -> None:
-        self.total: int | None = None
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._count, args=(found,), daemon=True)
-        self._thread.start()
-
-    def _count(self, found: Iterable[object]) -> None:
-        count = 0
-        with contextlib.suppress(ValueError, OSError):  # who judges the loops is told as well
-            for _ in found:
-                count += 1
-                if self._ended.is_set():
-                    return
-            self.total = count
-
-    def end(self) -> None:
-        """Stop counting."""
-        self._ended.set()
-        self._thread.join(ENDS_WITHIN)
-
 
 class Lines:
     """Prints a line now and then, where a bar would fill a file."""
@@ -65,22 +39,24 @@ class Lines:
 def progress(found: Iterable[object] | None) -> Iterator[Callable[["Reached"], None]]:
     """Show how far a survey is: a bar on a terminal, lines elsewhere.
 
-    The loops are found once more, to be counted; None where reading them twice costs too much.
+    The loops are found once more, to be counted beside the work; None where reading them twice
+    costs too much.
     """
-    counted = None if found is None else Counted(found)
+    totals: list[int] = []
+
+    def count(loops: Iterable[object]) -> None:
+        with contextlib.suppress(ValueError, OSError):  # who judges the loops is told as well
+            totals.append(sum(1 for _ in loops))
 
     def tell(reached: "Reached") -> None:
-        total = None if counted is None else counted.total
-        if total is None:
+        if not totals:
             shown(0.0, f"{reached.done} loops: {reached.entry.name}")
             return
-        total = max(total, reached.drawn)
+        total = max(totals[0], reached.drawn)
         shown(reached.done / total, f"{reached.done} of {total} loops: {reached.entry.name}")
 
-    try:
-        with bar("survey") as show:
-            shown = show if sys.stderr.isatty() else Lines(time.monotonic)
-            yield tell
-    finally:
-        if counted is not None:
-            counted.end()
+    if found is not None:
+        threading.Thread(target=count, args=(found,), daemon=True).start()
+    with bar("survey") as show:
+        shown = show if sys.stderr.isatty() else Lines(time.monotonic)
+        yield tell

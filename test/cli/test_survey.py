@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from stiction_ros.cli.main import main
-from stiction_ros.cli.survey_progress import Counted, Lines, progress
+from stiction_ros.cli.survey_progress import Lines, progress
 from stiction_ros.errors import InputError
 from stiction_ros.survey import survey as surveying
 from stiction_ros.survey.engines import dask as dask_engine
@@ -126,12 +126,6 @@ def test_a_file_gets_a_line_now_and_then(capsys: pytest.CaptureFixture[str]) -> 
         "survey: later",
         "",
     ]
-
-
-def test_loops_are_counted_beside_the_work() -> None:
-    counted = Counted(range(7))
-    counted.end()
-    assert counted.total in (7, None)
 
 
 def test_a_path_that_is_not_there_is_said(capsys: pytest.CaptureFixture[str]) -> None:
