@@ -80,25 +80,18 @@ def grouped(entries: Sequence[Entry]) -> tuple[list[Entry], list[Group]]:
     clocks = ["dates" if e.beats and e.beats[0] > DATES else e.files for e in entries]
     turns = [float(np.median(np.diff(each))) if len(each) > 1 else 0.0 for each in times]
     cycling = sorted((k for k, turn in enumerate(turns) if turn > 0.0), key=turns.__getitem__)
-    parent = list(range(len(entries)))
-
-    def root(k: int) -> int:
-        while parent[k] != k:
-            parent[k] = parent[parent[k]]
-            k = parent[k]
-        return k
-
+    group = np.arange(len(entries))
     for place, one in enumerate(cycling):
         for other in cycling[place + 1 :]:
             if math.log(turns[other] / turns[one]) > ALIKE:
                 break
-            if root(one) == root(other) or clocks[one] != clocks[other]:
+            if group[one] == group[other] or clocks[one] != clocks[other]:
                 continue
             if locked(times[one], times[other]):
-                parent[root(other)] = root(one)
+                group[group == group[other]] = group[one]
     members: dict[int, list[int]] = {}
     for k in cycling:
-        members.setdefault(root(k), []).append(k)
+        members.setdefault(int(group[k]), []).append(k)
     found = [rows for rows in members.values() if len(rows) > 1]
     found.sort(key=lambda rows: (-len(rows), entries[rows[0]].name))
     numbered, groups = list(entries), []

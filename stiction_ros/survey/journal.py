@@ -2,7 +2,6 @@
 
 import dataclasses
 import hashlib
-import itertools
 import json
 from pathlib import Path
 from typing import IO, Any
@@ -23,40 +22,46 @@ class Journal:
 
         What is there counts to ``resume``; else no loop may be there. Another mark is refused.
         """
-        self.path = folder / FILE
+        path, whole = folder / FILE, 0
         self.known: dict[str, Entry] = {}
-        if resume and self.path.exists():
-            whole = self._read(mark)
-            self._file: IO[bytes] = self.path.open("r+b")
-            self._file.seek(whole)
-            self._file.truncate()
-        else:
-            _refuse_loops(self.path)
-            self._file = self.path.open("wb")
-        if not self._file.tell():
+        path.touch()
+        self._file: IO[bytes] = path.open("r+b")
+        for number, text in enumerate(self._file):
+            if not text.endswith(b"\n"):
+                break  # broken off while it was written
+            if resume:
+                self._take(text, mark, f"{path}: line {number + 1}")
+                whole += len(text)
+            elif number:  # what loops cost is not thrown away unasked
+                raise InputError(
+                    "holds a survey",
+                    where=str(folder),
+                    fix="--resume goes on with it, or choose another --out",
+                )
+        self._file.seek(whole)
+        self._file.truncate()
+        if not whole:
             self._write({"survey": 1, "options": mark})
 
-    def _read(self, mark: str) -> int:
-        """Take in what is there, and return the bytes of its whole lines."""
-        where, whole = str(self.path), 0
-        with self.path.open("rb") as file:
-            for number, text in enumerate(file):
-                if not text.endswith(b"\n"):
-                    break  # broken off while it was written
-                try:
-                    line = json.loads(text)
-                    if number:
-                        self.known[line["key"]] = Entry.from_line(line["entry"])
-                except (json.JSONDecodeError, KeyError, TypeError, ValueError):
-                    raise InputError(
-                        f"line {number + 1} is no result of a survey",
-                        where=where,
-                        fix="remove the file, or choose another --out",
-                    ) from None
-                if not number:
-                    _check(line, mark, where)
-                whole += len(text)
-        return whole
+    def _take(self, text: bytes, mark: str, where: str) -> None:
+        """Take in a line that is there: what the options were, or a loop."""
+        try:
+            line = json.loads(text)
+            other = "survey" in line and line["options"] != mark
+            if "survey" not in line:
+                self.known[line["key"]] = Entry.from_line(line["entry"])
+        except (KeyError, TypeError, ValueError):
+            raise InputError(
+                "is no result of a survey",
+                where=where,
+                fix="remove the file, or choose another --out",
+            ) from None
+        if other:
+            raise InputError(
+                "was written with other options",
+                where=where,
+                fix="use the same ones, or choose another --out",
+            )
 
     def add(self, key: str, entry: Entry) -> None:
         """Keep a loop."""
@@ -81,27 +86,3 @@ def key_of(loop: Loop) -> str:
         status = file.stat() if file.exists() else None
         parts.append([str(file), *([status.st_size, status.st_mtime_ns] if status else [])])
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:20]
-
-
-def _refuse_loops(path: Path) -> None:
-    """Raise where loops are kept: what they cost is not thrown away unasked."""
-    if not path.exists():
-        return
-    with path.open("rb") as file:
-        if sum(1 for _ in itertools.islice(file, 2)) == 2:
-            raise InputError(
-                "holds a survey",
-                where=str(path.parent),
-                fix="--resume goes on with it, or choose another --out",
-            )
-
-
-def _check(line: Any, mark: str, where: str) -> None:
-    if not isinstance(line, dict) or line.get("survey") != 1:
-        raise InputError("was not written by a survey", where=where, fix="name another folder")
-    if line.get("options") != mark:
-        raise InputError(
-            "was written with other options",
-            where=where,
-            fix="use the same ones, or choose another --out",
-        )
