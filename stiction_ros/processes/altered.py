@@ -24,6 +24,8 @@ class AlteredProcess(Process):
         self, inner: Process, effects: tuple[tuple[Behaviour, ...], ...], sample_time: float
     ) -> None:
         """Put ``effects``, one tuple of linear ones per output, behind ``inner``."""
+        from scipy.linalg import block_diag  # slow to import
+
         if len(effects) != len(inner.outputs):
             raise InputError(f"{len(effects)} lists of effects for {len(inner.outputs)} outputs")
         self.inner, self.effects = inner, effects
@@ -33,9 +35,9 @@ class AlteredProcess(Process):
         self._point = inner.linear(sample_time).pv0
         self._chains = [[_filter(effect, sample_time) for effect in chain] for chain in effects]
         filters = [_in_series(chain) for chain in self._chains]
-        self._a = _diagonal([f.a for f in filters])
-        self._b = _diagonal([f.b[:, None] for f in filters])
-        self._c = _diagonal([f.c[None, :] for f in filters])
+        self._a = block_diag(*[f.a for f in filters])
+        self._b = block_diag(*[f.b[:, None] for f in filters])
+        self._c = block_diag(*[f.c[None, :] for f in filters])
         self._d = np.array([f.d for f in filters])
 
     def rest(self, stem: FloatArray, pv: FloatArray) -> FloatArray:
@@ -111,16 +113,4 @@ def _in_series(filters: list[Filter]) -> Filter:
             np.concatenate([new.d * whole.c, new.c]),
             whole.d * new.d,
         )
-    return whole
-
-
-def _diagonal(blocks: list[FloatArray]) -> FloatArray:
-    """Return the matrix that has ``blocks`` on its diagonal and zeros elsewhere."""
-    rows, columns = (sum(block.shape[axis] for block in blocks) for axis in (0, 1))
-    whole = np.zeros((rows, columns))
-    row = column = 0
-    for block in blocks:
-        height, width = block.shape
-        whole[row : row + height, column : column + width] = block
-        row, column = row + height, column + width
     return whole

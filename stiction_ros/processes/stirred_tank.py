@@ -7,6 +7,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.processes.process import LinearModel, Noise, Process
+from stiction_ros.processes.sampled import transition
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,8 +93,6 @@ class StirredTank(Process):
 
     def linear(self, sample_time: float) -> LinearModel:
         """Return the tank linearised about the valves at (50, 50) %, zero-order hold."""
-        from scipy.linalg import expm
-
         stem0 = np.array([50.0, 50.0])
         pv0 = self.steady_state(stem0)
         names = self.measured_disturbances
@@ -107,12 +106,8 @@ class StirredTank(Process):
         size = len(point)
         steps = np.eye(size) * 1e-5
         jacobian = np.array([(rate(point + s) - rate(point - s)) / 2e-5 for s in steps]).T
-        held = np.zeros((size, size))
-        held[:2] = jacobian * sample_time / 60.0
-        discrete = expm(held)[:2]
-        return LinearModel(
-            discrete[:, :2], discrete[:, 2:4], np.eye(2), discrete[:, 4:], np.zeros(2), stem0, pv0
-        )
+        a, held = transition(jacobian[:, :2], jacobian[:, 2:], sample_time / 60.0)
+        return LinearModel(a, held[:, :2], np.eye(2), held[:, 2:], np.zeros(2), stem0, pv0)
 
     def _rate(self, state: FloatArray, stem: FloatArray, upset: FloatArray) -> FloatArray:
         """Return (dC/dt, dT/dt) per minute by (A.1)."""
