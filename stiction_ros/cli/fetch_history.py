@@ -21,7 +21,7 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "fetch-history",
         description="Read the history of the loops of a tag map, page by page, and write one CSV "
-        "record a loop. A call that was broken off goes on where it stopped.",
+        "record a loop. A call that was broken off goes on with the tag at which it stopped.",
     )
     option = parser.add_argument
     option("url", metavar="URL", help="address of the server, opc.tcp://HOST:PORT")
@@ -43,7 +43,7 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    from stiction_ros.opcua.history import HistoryFile, Span, fetch, modes_of, record_of
+    from stiction_ros.opcua.history import Span, fetch, modes_of, record_of
 
     require_asyncua()
     check_address(options.url, "URL")
@@ -53,17 +53,16 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("is not after --from", where="--to")
     credentials = credentials_of(options)
     out = Path(options.out)
-    files: dict[str, HistoryFile] = {}
+    files: dict[str, Path] = {}
     for loop in loops:
         for tag in _tags(loop):
-            path = out / "raw" / f"{loop.loop}_{len(files) + 1}.txt"
-            files.setdefault(tag, HistoryFile(path))
+            files.setdefault(tag, out / "raw" / f"{loop.loop}_{len(files) + 1}.json")
     with bar("reading history") as show:
-        asyncio.run(fetch(options.url, credentials, files, span, show))
+        found = asyncio.run(fetch(options.url, credentials, files, span, show))
     for loop in loops:
-        record = record_of(loop, files, span)
+        record = record_of(loop, found, span)
         target = out / f"{loop.loop}.csv"
-        write_csv(record, target, modes=modes_of(loop, files, record))
+        write_csv(record, target, modes=modes_of(loop, found, record))
         bad = int((record.quality == 2).sum())
         print(f"{target}: {len(record)} samples of {record.sample_time:g} s, {bad} bad")
     print("raw values are kept below", out / "raw", file=sys.stderr)

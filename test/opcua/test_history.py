@@ -13,7 +13,7 @@ from small_maps import MODE, OP, PV, SP, loop_tags
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
 from stiction_ros.opcua import history
-from stiction_ros.opcua.history import HistoryFile, Span, modes_of, record_of
+from stiction_ros.opcua.history import Span, modes_of, record_of
 from stiction_ros.opcua.sampling import TagQuality, TagReading
 from stiction_ros.opcua.tag_map import ValveTags
 from stiction_ros.records.csv_writer import write_csv
@@ -72,11 +72,11 @@ def test_pages_become_the_record(
 
 def test_what_was_broken_off_goes_on(plant: PlantProcess, tmp_path: Path) -> None:
     assert call(plant, tmp_path) == 0
-    whole = {path: path.read_text() for path in (tmp_path / "raw").glob("*.txt")}
+    whole = {path: path.read_text() for path in (tmp_path / "raw").glob("*.json")}
     assert len(whole) == 8
-    for path, text in whole.items():
-        path.write_text(text[: len(text) // 2])
-        path.with_suffix(".done").unlink()
+    for path, text in list(whole.items())[4:]:
+        path.with_suffix(".part").write_text(text[: len(text) // 2])
+        path.unlink()
     (tmp_path / "tank.csv").unlink()
     assert call(plant, tmp_path) == 0
     assert {path: path.read_text() for path in whole} == whole
@@ -109,7 +109,7 @@ def test_what_cannot_be_fetched_is_said(
     assert said in capsys.readouterr().err
 
 
-def test_bad_values_are_marked_and_op_belongs_to_most_of_its_sample(tmp_path: Path) -> None:
+def test_bad_values_are_marked_and_op_belongs_to_most_of_its_sample() -> None:
     second = 1_000_000_000
     span = Span(0, 10 * second)
     told = {
@@ -121,18 +121,15 @@ def test_bad_values_are_marked_and_op_belongs_to_most_of_its_sample(tmp_path: Pa
             (42.0, TagQuality.GOOD, 5.6),
         ],
     }
-    files = {}
-    for number, (tag, values) in enumerate(told.items()):
-        files[tag] = HistoryFile(tmp_path / f"{number}.txt")
-        files[tag].begin(tag, span)
-        files[tag].append([TagReading(v, q, round(at * second)) for v, q, at in values])
-    record = record_of(loop_tags(), files, span)
+    found = {
+        tag: [TagReading(v, q, round(at * second)) for v, q, at in values]
+        for tag, values in told.items()
+    }
+    record = record_of(loop_tags(), found, span)
     assert record.op[:, 0].tolist() == [40.0, 41.0, 41.0, 41.0, 41.0, 42.0, 42.0, 42.0, 42.0]
     assert np.flatnonzero(record.quality == Quality.BAD).tolist() == [3]
-    files[PV] = HistoryFile(tmp_path / "none.txt")
-    files[PV].begin(PV, span)
     with pytest.raises(InputError, match="no history"):
-        record_of(loop_tags(), files, span)
+        record_of(loop_tags(), found | {PV: []}, span)
 
 
 def test_manual_stretches_are_a_column_and_cut_by_the_intake(tmp_path: Path) -> None:
@@ -145,13 +142,12 @@ def test_manual_stretches_are_a_column_and_cut_by_the_intake(tmp_path: Path) -> 
         OP: [(40.0 + k % 5, good, k) for k in range(40)],
         MODE: [("AUTO", good, 0), ("MAN", good, 10), ("", TagQuality.BAD, 12), ("CAS", good, 20)],
     }
-    files = {}
-    for number, (tag, values) in enumerate(told.items()):
-        files[tag] = HistoryFile(tmp_path / f"{number}.txt")
-        files[tag].begin(tag, span)
-        files[tag].append([TagReading(v, q, round(at * second)) for v, q, at in values])
-    record = record_of(loop_tags(), files, span)
-    modes = modes_of(loop_tags(), files, record)
+    found = {
+        tag: [TagReading(v, q, round(at * second)) for v, q, at in values]
+        for tag, values in told.items()
+    }
+    record = record_of(loop_tags(), found, span)
+    modes = modes_of(loop_tags(), found, record)
     assert modes == ["AUTO"] * 10 + ["MAN"] * 10 + ["CAS"] * 20
     write_csv(record, tmp_path / "unit.csv", modes=modes)
     (read,) = read_csv_parts(tmp_path / "unit.csv")
@@ -171,14 +167,13 @@ def test_of_several_valves_the_one_that_is_not_automatic_tells_the_mode(tmp_path
         "s=MODE1": [("CAS", 1)],
         "s=MODE2": [("AUTO", 0), ("MAN", 3), ("AUTO", 5)],
     }
-    files = {}
-    for number, (tag, values) in enumerate(told.items()):
-        files[tag] = HistoryFile(tmp_path / f"{number}.txt")
-        files[tag].begin(tag, Span(0, 5 * second))
-        files[tag].append([TagReading(v, TagQuality.GOOD, at * second) for v, at in values])
-    record = record_of(tags, files, Span(0, 5 * second))
-    assert modes_of(tags, files, record) == ["", "CAS", "CAS", "MAN", "MAN", "CAS"]
-    write_csv(record, tmp_path / "two.csv", modes=modes_of(tags, files, record))
+    found = {
+        tag: [TagReading(v, TagQuality.GOOD, at * second) for v, at in values]
+        for tag, values in told.items()
+    }
+    record = record_of(tags, found, Span(0, 5 * second))
+    assert modes_of(tags, found, record) == ["", "CAS", "CAS", "MAN", "MAN", "CAS"]
+    write_csv(record, tmp_path / "two.csv", modes=modes_of(tags, found, record))
     (read,) = read_csv_parts(tmp_path / "two.csv")
     assert read.valves == ("V1", "V2")
     assert (read.quality == Quality.MANUAL).tolist() == [False, False, False, True, True, False]
