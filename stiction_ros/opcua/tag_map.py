@@ -4,14 +4,18 @@ import dataclasses
 import enum
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any, TypeVar
 
 from stiction_ros.errors import InputError
 from stiction_ros.loop.yaml_reading import Section, load_yaml
 
+T = TypeVar("T")
+
 _NODE = re.compile(r"(ns=\d+;|nsu=[^;]+;)?[isgb]=.+")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_ADDRESS = re.compile(r"opc\.tcp://(?:\[[\da-fA-F:.]+\]|[^\s/:\[\]]+)(?::([^\s/]*))?(?:/\S*)?")
 HIGHEST_PORT = 65_535
 WATCHDOG = 5.0  # s without a beat after which the other side is given up
 
@@ -24,47 +28,98 @@ class Use(enum.Enum):
     OP = "op"
 
 
+def _said(read: Callable[[Section, str], object], default: object = dataclasses.MISSING) -> Any:
+    """Declare a field that stands in the tag map under its own name, and what reads it there."""
+    return dataclasses.field(default=default, metadata={"read": read})
+
+
+def _read(kind: type[T], section: Section) -> T:
+    """Return what a section says; InputError at what is wrong, lacking or unknown."""
+    found = {
+        field.name: field.metadata["read"](section, field.name)
+        for field in dataclasses.fields(kind)
+        if field.name in section or field.default is dataclasses.MISSING
+    }
+    section.finish()
+    return kind(**found)
+
+
+def _name(section: Section, key: str) -> str:
+    name = section.text(key)
+    if not _NAME.fullmatch(name):
+        raise InputError(
+            f"{name!r} is no name", where=section.at(key), fix="use letters, digits and _"
+        )
+    return name
+
+
+def _node(section: Section, key: str) -> str:
+    """Return a node id such as ``ns=2;s=FIC101.PV`` or ``nsu=urn:plant;s=FIC101.PV``."""
+    node = section.text(key)
+    if not _NODE.fullmatch(node):
+        raise InputError(
+            f"{node!r} is no node id", where=section.at(key), fix="write ns=2;s=FIC101.PV"
+        )
+    return node
+
+
+def _rising(section: Section, key: str) -> tuple[float, ...]:
+    limits = section.numbers(key, count=2)
+    if not limits[0] < limits[1]:
+        raise InputError("are not rising", where=section.at(key), fix="write [low, high]")
+    return tuple(limits.tolist())
+
+
+def _modes(section: Section, key: str) -> tuple[str, ...]:
+    modes = section.raw(key)
+    if not isinstance(modes, list) or not modes:
+        raise InputError("is no list of modes", where=section.at(key), fix="write [RCAS]")
+    return tuple(map(str, modes))
+
+
 @dataclasses.dataclass(frozen=True)
 class OutputTags:
     """Tags of one process variable; ``sp`` is empty where it has none."""
 
-    name: str
-    pv: str
-    sp: str = ""
+    name: str = _said(_name)
+    pv: str = _said(_node)
+    sp: str = _said(_node, "")
 
 
 @dataclasses.dataclass(frozen=True)
 class ValveTags:
     """Tags of one valve."""
 
-    name: str  # of the valve
-    op_read: str  # tag of the OP in force, %
-    op: str = ""  # tag that a remote OP is written to, %; empty where nothing may be written
-    mode: str = ""  # tag of the mode of its controller; empty where it is not known
-    limits: tuple[float, float] = (0.0, 100.0)  # of what may be written, %
-    rate: float = 1.0  # largest change of what is written, % per second of the plant's time
-    low: str = ""  # low, high: tags of limits that the plant itself sets, %; empty for none
-    high: str = ""
+    name: str = _said(_name)  # of the valve
+    op_read: str = _said(_node)  # tag of the OP in force, %
+    op: str = _said(_node, "")  # tag that a remote OP is written to, %; empty: nothing is written
+    mode: str = _said(_node, "")  # tag of the mode of its controller; empty where it is not known
+    limits: tuple[float, float] = _said(_rising, (0.0, 100.0))  # of what may be written, %
+    # largest change of what is written, % per second of the plant's time
+    rate: float = _said(lambda section, key: section.number(key, above=0.0), 1.0)
+    low: str = _said(_node, "")  # low, high: tags of limits that the plant sets, %; empty for none
+    high: str = _said(_node, "")
 
 
 @dataclasses.dataclass(frozen=True)
 class DisturbanceTag:
     """Tag of a measured disturbance; it is told in deviations from ``nominal``."""
 
-    name: str
-    tag: str
-    nominal: float = 0.0
+    name: str = _said(_name)
+    tag: str = _said(_node)
+    nominal: float = _said(Section.number, 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
 class GrantTags:
     """The handshake of a loop."""
 
-    request: str  # tag that says 1 while remote operation is asked for, else 0
-    granted: tuple[str, ...]  # what the mode of each valve says while it is granted
-    heartbeat: str  # tag that we let rise; the plant takes over when it stands still
-    alive: str = ""  # tag that the plant lets rise; empty for none
-    watchdog: float = WATCHDOG  # s of standing still after which either side gives the other up
+    request: str = _said(_node)  # tag that says 1 while remote operation is asked for, else 0
+    granted: tuple[str, ...] = _said(_modes)  # what the mode of each valve says while it is granted
+    heartbeat: str = _said(_node)  # tag that we let rise; the plant takes over when it stands still
+    alive: str = _said(_node, "")  # tag that the plant lets rise; empty for none
+    # s of standing still after which either side gives the other up
+    watchdog: float = _said(lambda section, key: section.number(key, low=0.2, high=600.0), WATCHDOG)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,21 +184,18 @@ class TagMap:
 
 def check_address(address: str, where: str) -> None:
     """Raise InputError unless ``address`` is one of OPC UA over TCP without a password in it."""
-    if not re.fullmatch(r"opc\.tcp://[^\s/]+(/\S*)?", address):
-        raise InputError("is no address of a server", where=where, fix="write opc.tcp://HOST:PORT")
     if "@" in address:
         raise InputError(
             "holds a user", where=where, fix="name user and password_file as parameters"
         )
-    place = address.removeprefix("opc.tcp://").partition("/")[0]
-    host, colon, port = place.rpartition(":")
-    if place.endswith("]"):  # of an address of IPv6
-        host, colon, port = place, "", ""
-    if colon and not (port.isascii() and port.isdigit() and 0 < int(port[:9]) <= HIGHEST_PORT):
-        raise InputError(f"{port!r} is no port", where=where, fix=f"use 1 to {HIGHEST_PORT}")
-    bare = host if colon else place
-    if not bare or (re.search(r"[\[\]:]", bare) and not re.fullmatch(r"\[[0-9a-fA-F:.]+\]", bare)):
+    found = _ADDRESS.fullmatch(address)
+    if found is None:
         raise InputError("is no address of a server", where=where, fix="write opc.tcp://HOST:PORT")
+    port = found[1]
+    if port is None:
+        return
+    if not (port.isascii() and port.isdigit() and 0 < int(port[:9]) <= HIGHEST_PORT):
+        raise InputError(f"{port!r} is no port", where=where, fix=f"use 1 to {HIGHEST_PORT}")
 
 
 def _loop(section: Section) -> LoopTags:
@@ -154,10 +206,11 @@ def _loop(section: Section) -> LoopTags:
         if namespace and not _NAME.fullmatch(str(namespace)):
             raise InputError(f"{namespace!r} is no name", where=section.at("namespace"))
     sample_time = section.number("sample_time", above=0.0)
-    outputs = tuple(_output(one) for one in section.sections("outputs"))
-    valves = tuple(_valve(one) for one in section.sections("valves"))
-    disturbances = tuple(_disturbance(one) for one in section.sections("disturbances", ()))
-    grant = _grant(section.section("write")) if "write" in section else None
+    outputs = tuple(_read(OutputTags, one) for one in section.sections("outputs"))
+    valves = tuple(_read(ValveTags, one) for one in section.sections("valves"))
+    upsets = section.sections("disturbances", ())
+    disturbances = tuple(_read(DisturbanceTag, one) for one in upsets)
+    grant = _read(GrantTags, section.section("write")) if "write" in section else None
     uncertain = section.choice("uncertain", ("bad", "good"), "bad") == "good"
     section.finish()
     if not outputs or not valves:
@@ -182,74 +235,6 @@ def _loop(section: Section) -> LoopTags:
                         fix=f"add {key}: or leave out write:",
                     )
     return LoopTags(name, namespace, sample_time, outputs, valves, disturbances, grant, uncertain)
-
-
-def _output(section: Section) -> OutputTags:
-    found = OutputTags(_name(section, "name"), _node(section, "pv"), _node(section, "sp", ""))
-    section.finish()
-    return found
-
-
-def _valve(section: Section) -> ValveTags:
-    limits = section.numbers("limits", [0.0, 100.0], count=2)
-    if not limits[0] < limits[1]:
-        raise InputError("are not rising", where=section.at("limits"), fix="write [low, high]")
-    found = ValveTags(
-        _name(section, "name"),
-        _node(section, "op_read"),
-        _node(section, "op", ""),
-        _node(section, "mode", ""),
-        (float(limits[0]), float(limits[1])),
-        section.number("rate", 1.0, above=0.0),
-        _node(section, "low", ""),
-        _node(section, "high", ""),
-    )
-    section.finish()
-    return found
-
-
-def _disturbance(section: Section) -> DisturbanceTag:
-    found = DisturbanceTag(
-        _name(section, "name"), _node(section, "tag"), section.number("nominal", 0.0)
-    )
-    section.finish()
-    return found
-
-
-def _grant(section: Section) -> GrantTags:
-    granted = section.raw("granted")
-    if not isinstance(granted, list) or not granted:
-        raise InputError("is no list of modes", where=section.at("granted"), fix="write [RCAS]")
-    found = GrantTags(
-        _node(section, "request"),
-        tuple(str(one) for one in granted),
-        _node(section, "heartbeat"),
-        _node(section, "alive", ""),
-        section.number("watchdog", WATCHDOG, low=0.2, high=600.0),
-    )
-    section.finish()
-    return found
-
-
-def _name(section: Section, key: str) -> str:
-    name = section.text(key)
-    if not _NAME.fullmatch(name):
-        raise InputError(
-            f"{name!r} is no name", where=section.at(key), fix="use letters, digits and _"
-        )
-    return name
-
-
-def _node(section: Section, key: str, default: str | None = None) -> str:
-    """Return a node id such as ``ns=2;s=FIC101.PV`` or ``nsu=urn:plant;s=FIC101.PV``."""
-    if default is not None and key not in section:
-        return default
-    node = section.text(key)
-    if not _NODE.fullmatch(node):
-        raise InputError(
-            f"{node!r} is no node id", where=section.at(key), fix="write ns=2;s=FIC101.PV"
-        )
-    return node
 
 
 def _once(names: list[str], where: str, what: str) -> None:
