@@ -3,8 +3,6 @@
 import dataclasses
 import enum
 
-FOREIGN = "another one lets the heartbeat rise"
-
 
 class GrantState(enum.Enum):
     """Where the handshake stands."""
@@ -13,16 +11,6 @@ class GrantState(enum.Enum):
     IDLE = "idle"  # nothing is asked for; the plant's own controller has the valves
     ASKED = "asked"  # remote operation is asked for; the mode does not grant it yet
     GRANTED = "granted"  # the mode of each valve grants it; OP is written
-
-
-@dataclasses.dataclass(frozen=True)
-class Facts:
-    """What is known at one look."""
-
-    now: float  # s on our clock
-    granted: bool  # whether the mode of every valve grants remote operation, by good quality
-    fault: str = ""  # what speaks against writing now; empty for nothing
-    foreign: bool = False  # whether another one lets the heartbeat rise
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,33 +45,33 @@ class Grant:
             return self
         return Grant(GrantState.IDLE, now, reason, lost=self.requesting)
 
-    def follow(self, facts: Facts) -> "Grant":
+    def follow(self, now: float, granted: bool, fault: str = "") -> "Grant":
         """Return what becomes of it.
 
-        - idle and wanted: asked, once nothing speaks against it and nobody else asks.
+        - idle and wanted: asked, once nothing speaks against it.
         - asked: granted when every mode says so; idle at a fault.
-        - granted: idle at a fault, another writer, or as soon as a mode says otherwise.
+        - granted: idle at a fault, or as soon as a mode says otherwise.
 
         A grant that was lost is not asked for again by itself: the operator may have meant it.
+
+        Args:
+            now: s on our clock.
+            granted: whether the mode of every valve grants remote operation, by good quality.
+            fault: what speaks against writing now; empty for nothing.
         """
         if self.state is GrantState.LISTENING or (not self.wanted and not self.requesting):
             return self
         if self.state is GrantState.IDLE:
-            if facts.fault or facts.foreign:
-                why = FOREIGN if facts.foreign else facts.fault
+            why = fault or "the mode grants what was not asked for" * granted
+            if why:
                 return dataclasses.replace(self, reason=f"waits: {why}")
-            if facts.granted:
-                why = "the mode grants what was not asked for"
-                return dataclasses.replace(self, reason=f"waits: {why}")
-            return Grant(GrantState.ASKED, facts.now, "waits for the operator")
-        if facts.fault:
-            return self.give_back(facts.now, facts.fault)
-        if facts.foreign:
-            return self.give_back(facts.now, FOREIGN)
-        if self.state is GrantState.ASKED and facts.granted:
-            return Grant(GrantState.GRANTED, facts.now, "granted by the mode")
-        if self.state is GrantState.GRANTED and not facts.granted:
-            return self.give_back(facts.now, "taken back by the mode")
+            return Grant(GrantState.ASKED, now, "waits for the operator")
+        if fault:
+            return self.give_back(now, fault)
+        if self.state is GrantState.ASKED and granted:
+            return Grant(GrantState.GRANTED, now, "granted by the mode")
+        if self.state is GrantState.GRANTED and not granted:
+            return self.give_back(now, "taken back by the mode")
         return self
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.online.health import stopped_after
 from stiction_ros.online.input.op_port import OpPort, Reception
-from stiction_ros.opcua.grant import Facts, GrantState, begin
+from stiction_ros.opcua.grant import GrantState, begin
 from stiction_ros.opcua.op_limits import OpLimits, RateWatch
 from stiction_ros.opcua.sampling import LoopSampler, PlantSample, TagQuality, TagReading
 from stiction_ros.opcua.tag_map import GrantTags, LoopTags, Use
@@ -195,8 +195,7 @@ class LoopBridge:
         if self.grant.state is GrantState.LISTENING:
             return []
         before = self.grant.state
-        facts = Facts(now, self._is_granted(), self._fault(now), self._foreign_beats(now))
-        self.grant = self.grant.follow(facts)
+        self.grant = self.grant.follow(now, self._is_granted(), self._fault(now))
         if self.grant.state is not before:
             self._last = None
         return [*self._request(now), *self._beats(now)]
@@ -222,6 +221,8 @@ class LoopBridge:
             return "nothing is heard of the server"
         if self.refused:
             return self.refused[0]
+        if self._foreign_beats(now):
+            return "another one lets the heartbeat rise"
         since = self._alive_since
         if told.alive and self._plant.silent_for(now, since) > told.watchdog:
             return "the plant's heartbeat stands still"
