@@ -45,7 +45,9 @@ def behaviours() -> tuple[type[Behaviour], ...]:
 @functools.cache
 def _found() -> tuple[type[Behaviour], ...]:
     modules = [module for folder in FOLDERS for module in _modules_in(f"{GROUP}.{folder}")]
-    modules += [_loaded(entry) for entry in metadata.entry_points(group=GROUP)]
+    for entry in metadata.entry_points(group=GROUP):
+        mend = "mend or uninstall the package that brings it"
+        modules.append(_loaded(entry.module, f"entry point {entry.value}", mend))
     found = [kind for module in modules for kind in _kinds_of(module)]
     found = list(dict.fromkeys(found))
     _refuse_twins(tuple(found))
@@ -60,38 +62,27 @@ def _modules_in(package: str) -> list[ModuleType]:
     found = sorted(pkgutil.iter_modules(folder.__path__), key=lambda info: info.name)
     if package != f"{GROUP}.own":
         return [importlib.import_module(f"{package}.{info.name}") for info in found]
-    return [_of_ones_own(package, info) for info in found]
+    mend = "mend the file, or take it out of the folder that STICTION_EFFECTS lists"
+    return [_loaded(f"{package}.{info.name}", _file_of(info), mend) for info in found]
 
 
-def _of_ones_own(package: str, info: pkgutil.ModuleInfo) -> ModuleType:
-    """Return the module of a file that others wrote, which may do anything when imported."""
+def _file_of(info: pkgutil.ModuleInfo) -> str:
+    assert isinstance(info.module_finder, FileFinder)
+    name = os.path.join(info.name, "__init__.py") if info.ispkg else f"{info.name}.py"
+    return os.path.join(info.module_finder.path, name)
+
+
+def _loaded(module: str, place: str, fix: str) -> ModuleType:
+    """Return a module that others wrote at a ``place``; it may do anything when imported."""
     try:
-        return importlib.import_module(f"{package}.{info.name}")
+        return importlib.import_module(module)
     except Exception as error:
-        assert isinstance(info.module_finder, FileFinder)
-        name = os.path.join(info.name, "__init__.py") if info.ispkg else f"{info.name}.py"
-        file = os.path.join(info.module_finder.path, name)
+        said = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
         raise InputError(
-            f"it cannot be loaded ({_told(error)})",
-            where=f"{file}{_line(error, file)}",
-            fix="mend the file, or take it out of the folder that STICTION_EFFECTS lists",
+            f"it cannot be loaded ({type(error).__name__}: {said})",
+            where=f"{place}{_line(error, place)}",
+            fix=fix,
         ) from error
-
-
-def _loaded(entry: metadata.EntryPoint) -> ModuleType:
-    try:
-        return importlib.import_module(entry.module)
-    except Exception as error:
-        raise InputError(
-            f"the effects of {entry.name!r} cannot be loaded ({_told(error)})",
-            where=f"entry point {entry.value}",
-            fix="mend or uninstall the package that brings them",
-        ) from error
-
-
-def _told(error: Exception) -> str:
-    said = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
-    return f"{type(error).__name__}: {said}"
 
 
 def _line(error: Exception, file: str) -> str:
