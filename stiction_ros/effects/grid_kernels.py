@@ -72,7 +72,7 @@ def playing(half: FloatArray, values: FloatArray, start: FloatArray) -> FloatArr
 
 
 @compiled
-def xch_stems(
+def following_stems(
     static: FloatArray, dynamic: FloatArray, values: FloatArray, start: FloatArray
 ) -> FloatArray:
     """Return stems of valves (f_S, f_D) that go on moving while OP goes on."""
@@ -90,32 +90,6 @@ def xch_stems(
             if direction[g] != 0.0:
                 stem[g] = value - direction[g] * dynamic[g]
             out[k, g] = stem[g]
-    return out
-
-
-@compiled
-def kano_stems(
-    band: FloatArray, jump: FloatArray, values: FloatArray, start: FloatArray
-) -> FloatArray:
-    """Return stems of valves (S, J) by Kano's rules."""
-    out = np.empty((len(values), len(band)))
-    for g in range(len(band)):
-        offset = (band[g] - jump[g]) / 2.0
-        stem, last, last_move, stopped_at = start[g], start[g], 0.0, start[g] + offset
-        stopped, direction = True, 1.0
-        for k in range(len(values)):
-            move = values[k] - last
-            if not stopped and move * last_move <= 0.0:
-                stopped_at, stopped = last, True
-            onwards = direction * (values[k] - stopped_at)
-            if stopped and -onwards > band[g]:
-                direction, stopped = -direction, False
-            elif stopped and onwards > jump[g]:
-                stopped = False
-            if not stopped:
-                stem = values[k] - direction * offset
-            last, last_move = values[k], move
-            out[k, g] = stem
     return out
 
 

@@ -39,10 +39,10 @@ def flow_chart(u: list[float], start: float, s: float, j: float) -> list[float]:
     return ys
 
 
-@given(laws, signals, percent)
-def test_it_is_the_flow_chart(law: KanoStiction, op: np.ndarray, start: float) -> None:
-    expected = flow_chart(op.tolist(), start, law.stick_band, law.jump)
-    assert law.simulate(op, start).tolist() == expected
+@given(st.builds(KanoStiction, quarters, quarters), exact_signals, eighths)
+def test_it_is_the_flow_chart(law: KanoStiction, op: list[float], start: float) -> None:
+    expected = flow_chart(op, start, law.stick_band, law.jump)
+    assert law.simulate(np.array(op), start).tolist() == expected
 
 
 def test_it_slips_after_j_onwards_and_after_s_backwards() -> None:

@@ -1,9 +1,10 @@
 """Kano's data-driven stiction model: stopped and moving states, S and J."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import ClassVar
 
-from stiction_ros.effects.behaviour import Memory
+from stiction_ros.effects.behaviour import FloatArray, Memory
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.stiction import NOT_SEARCHED, JumpForm, SlipJumpPair, Switching
 
@@ -27,9 +28,11 @@ class KanoStiction(SlipJumpPair):
             \chi_{k-1} & stp = 1
         \end{cases}
 
-    The memory is (χ, u, Δu, u_S, stp, d). :meth:`rest` puts the stem in the middle of its
-    band, so that it slips at f_S = (S + J)/2 in both directions; the paper leaves this
-    open. The paper also clips u to 0-100 % first; here that is the effect ``saturation``.
+    As u_S = χ + d (S − J)/2 while it is stopped, both thresholds are those of He,
+    |u − χ| > f_S with f_S = (S + J)/2, and stp is d = 0: the memory is (χ, u, d). :meth:`rest`
+    puts the stem in the middle of its band, so that it slips at f_S in both directions; the
+    paper leaves this open. The paper also clips u to 0-100 % first; here that is the effect
+    ``saturation``.
 
     References:
         M. Kano, H. Maruta, H. Kugemoto, K. Shimizu: Practical model and detection
@@ -40,25 +43,32 @@ class KanoStiction(SlipJumpPair):
     law: ClassVar[str | None] = "kano"
     not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching] = FollowingRules
-    kernel: ClassVar[str] = "kano_stems"
+    kernel: ClassVar[str] = "following_stems"
 
     def rest(self, value: float) -> Memory:
-        return (value, value, 0.0, value + self.dynamic_friction, 1.0, 1.0)
+        return (value, value, 0.0)
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        assert isinstance(memory, tuple)
-        stem, last, last_move, stopped_at, stopped, direction = memory
-        move = value - last
-        if stopped == 0.0 and move * last_move <= 0.0:
-            stopped_at, stopped = last, 1.0
-        onwards = direction * (value - stopped_at)
-        if stopped == 1.0 and -onwards > self.stick_band:
-            direction, stopped = -direction, 0.0
-        elif stopped == 1.0 and onwards > self.jump:
-            stopped = 0.0
-        if stopped == 0.0:
-            stem = value - direction * self.dynamic_friction
-        return (stem, value, move, stopped_at, stopped, direction), stem
+        return follow(memory, value, self.static_friction, self.dynamic_friction)
+
+    @classmethod
+    def kernel_figures(cls, grid: FloatArray, sample_time: float) -> Sequence[FloatArray]:
+        return (grid[:, 0] + grid[:, 1]) / 2.0, (grid[:, 0] - grid[:, 1]) / 2.0
 
     def jump_form(self) -> JumpForm:
         return JumpForm(self, self.static_friction, self.dynamic_friction)
+
+
+def follow(memory: Memory, value: float, static: float, dynamic: float) -> tuple[Memory, float]:
+    """Advance the memory (χ, u, d) of a valve with a moving state by a sample of OP.
+
+    It moves on while OP goes on, and slips as He's law does; d = 0 at rest.
+    """
+    assert isinstance(memory, tuple)
+    stem, last, direction = memory
+    error = value - stem
+    if direction * (value - last) <= 0.0:
+        direction = float((error > 0.0) - (error < 0.0)) if abs(error) > static else 0.0
+    if direction != 0.0:
+        stem = value - direction * dynamic
+    return (stem, value, direction), stem

@@ -4,6 +4,7 @@ import dataclasses
 from typing import ClassVar
 
 from stiction_ros.effects.behaviour import Memory
+from stiction_ros.effects.friction.kano import follow
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.stiction import NOT_SEARCHED, FrictionPair, JumpForm, Switching
 
@@ -42,21 +43,13 @@ class XchStiction(FrictionPair):
     law: ClassVar[str | None] = "xch"
     not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching] = FollowingRules
-    kernel: ClassVar[str] = "xch_stems"
+    kernel: ClassVar[str] = "following_stems"
 
     def rest(self, value: float) -> Memory:
         return (value, value, 0.0)
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        assert isinstance(memory, tuple)
-        stem, last, direction = memory
-        error = value - stem
-        if direction * (value - last) <= 0.0:
-            slips = abs(error) > self.static_friction
-            direction = float((error > 0.0) - (error < 0.0)) if slips else 0.0
-        if direction != 0.0:
-            stem = value - direction * self.dynamic_friction
-        return (stem, value, direction), stem
+        return follow(memory, value, self.static_friction, self.dynamic_friction)
 
     def jump_form(self) -> JumpForm:
         return JumpForm(self, self.static_friction, self.dynamic_friction)
