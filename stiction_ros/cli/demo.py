@@ -130,7 +130,7 @@ def _report_unit(scenario: "UnitScenario", directory: Path, seconds: float) -> b
 
     from stiction_ros.records.run.log import read_runs
     from stiction_ros.report.page import write_page
-    from stiction_ros.report.run import unit
+    from stiction_ros.survey import unit
 
     report = unit.unit_report(read_runs(directory / "bag", scenario.members), scenario)
     page = write_page(directory, unit.unit_page(report), unit.unit_summary(report, seconds))

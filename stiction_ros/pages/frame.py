@@ -111,7 +111,6 @@ svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
   main { padding: 18px 14px 44px; }
   dl { display: block; } dd { margin: 0 0 6px; }
   table.list, table.list thead, table.list tbody { display: block; }
-  table.list thead:not(:has(button)) { display: none; }
   table.list { font-size: .92rem; }
   table.list tr { display: grid; grid-template-columns: 1fr 1fr; gap: 0 14px; padding: 9px 0;
     border-bottom: 1px solid var(--line); }

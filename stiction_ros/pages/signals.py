@@ -2,6 +2,7 @@
 
 import dataclasses
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -23,13 +24,19 @@ UNCYCLED = 240  # samples of the window where there is no cycle
 class Units:
     """Units of PV and of OP, HTML; ``outputs`` has those of single PVs by name."""
 
-    pv: str
-    op: str
+    pv: str = "PV units"
+    op: str = "% of travel"
     outputs: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def axis(self, output: str) -> str:
         """Return name and unit of a PV."""
         return f"{text(output)} ({self.outputs.get(output, self.pv)})"
+
+    def said(self, html: str) -> str:
+        """Return in these units what is said of a loop in PV units and in %; shares of OP stay."""
+        if not self.op.startswith("%"):
+            html = re.sub(r"(\d) %( of travel|(?! of\b))", r"\1 units", html)
+        return html.replace(UNITS.pv, self.pv)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,7 +48,7 @@ class View:
     shade: tuple[tuple[float, float], ...] = ()
 
 
-UNITS = Units("PV units", "% of travel")
+UNITS = Units()
 
 
 @dataclasses.dataclass(frozen=True)

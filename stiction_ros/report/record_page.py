@@ -11,7 +11,7 @@ from stiction_ros.identification.answer.summary import cycle, materiality, next_
 from stiction_ros.identification.judgement import definitions
 from stiction_ros.pages.frame import framed, listed, text, words
 from stiction_ros.pages.plot import SCRIPT, Curve, over_time
-from stiction_ros.pages.signals import UNITS, all_signals, close_look
+from stiction_ros.pages.signals import UNITS, Units, all_signals, close_look
 from stiction_ros.records.parts import joined, span
 from stiction_ros.records.record import Record
 from stiction_ros.records.valve_work import ValveWork
@@ -49,9 +49,26 @@ def report_record(
 
 
 def record_page(
-    record: Record, identification: Identification, parts: Sequence[Record] = ()
+    record: Record,
+    identification: Identification,
+    parts: Sequence[Record] = (),
+    *,
+    units: Units = UNITS,
+    above: str = "",
+    helps: str = "",
+    notes: Sequence[str] = (),
 ) -> str:
-    """Return the report of a record as HTML; ``parts`` are all parts of its source."""
+    """Return the report of a record as HTML.
+
+    Args:
+        record: that was looked at.
+        identification: of this record.
+        parts: all parts of the source that it is from, when there are several.
+        units: of PV and OP.
+        above: what stands above the headline, HTML.
+        helps: the section on what would help, HTML.
+        notes: besides those of record and identification.
+    """
     found = finite(identification.to_dict())
     headline = verdict_line(found["valves"])
     kicker = f"{record.name}: {len(record)} samples of {record.sample_time:g} s, {span(record)}"
@@ -60,23 +77,25 @@ def record_page(
         trouble = (
             f'<p class="note warn">The fit is not to be trusted: {text(identification.reason)}</p>'
         )
-    notes = dict.fromkeys([*record.notes, *identification.notes])
+    told = dict.fromkeys([*record.notes, *identification.notes, *notes])
     whole = (joined(parts) if parts else record).filled()
     stem = _stem_within(record, identification, joined(parts) if parts else record)
     sections = [
+        above,
         f"<h1>{text(headline)}</h1>",
         f'<p class="soft">{text(kicker)}</p>',
         trouble,
-        lead(identification),
-        valve_cards(found["valves"]),
+        units.said(lead(identification)),
+        units.said(valve_cards(found["valves"])),
+        helps,
         work_table(record, identification),
-        close_look(record, identification, UNITS),
-        all_signals(whole, stem, UNITS),
-        _free_runs(record, identification),
+        close_look(record, identification, units),
+        all_signals(whole, stem, units),
+        _free_runs(record, identification, units),
         evidence_table(identification.valves),
-        process_table(found["outputs"], record.sample_time),
-        responses(found["outputs"], record, UNITS, None),
-        f"<h2>Notes</h2>{listed(notes)}" if notes else "",
+        units.said(process_table(found["outputs"], record.sample_time)),
+        responses(found["outputs"], record, units, None),
+        f"<h2>Notes</h2>{listed(told)}" if told else "",
     ]
     return framed(f"{record.name}: {headline}", sections, SCRIPT)
 
@@ -114,7 +133,7 @@ def _stem_within(
     return None
 
 
-def _free_runs(record: Record, found: Identification) -> str:
+def _free_runs(record: Record, found: Identification, units: Units) -> str:
     """Return each PV beside the model that is driven by the recorded OP alone."""
     if found.stem.shape != record.op.shape:
         return ""
@@ -130,7 +149,7 @@ def _free_runs(record: Record, found: Identification) -> str:
             f"{number(model.fit_one_step)} %. Loads that were not recorded are not in it: they "
             "lower this fit, not the probability of friction."
         )
-        drawn.append(over_time(said, record.time, curves, UNITS.axis(model.name), record.start))
+        drawn.append(over_time(said, record.time, curves, units.axis(model.name), record.start))
     return "<h2>Model against measurement</h2>" + "".join(drawn) if drawn else ""
 
 

@@ -6,12 +6,13 @@ import pytest
 from browser import check, needs_browser, probe
 from made import GAIN, entry, identification, record
 
+from stiction_ros.pages.signals import Units
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.groups import Group
 from stiction_ros.survey.listing.headline import Earlier, in_words
 from stiction_ros.survey.listing.page import list_page
 from stiction_ros.survey.pages.loop_page import loop_page
-from stiction_ros.survey.pages.words import in_op_unit, period
+from stiction_ros.survey.pages.words import period
 from stiction_ros.survey.survey import Survey
 
 EARLIER = (
@@ -101,7 +102,7 @@ def test_a_list_with_all_columns_and_the_longest_words_is_readable(
 def test_the_page_of_a_loop_is_readable(loop_file: Path, width: int, dark: bool) -> None:
     seen = probe(loop_file, width, dark=dark)
     check(seen, width, dark)
-    for words in ("The valve sticks", "3 values were held", "m³/h", "service the valve"):
+    for words in ("Valve V1 sticks", "3 values were held", "m³/h", "service the valve"):
         assert words in seen["text"]
 
 
@@ -246,16 +247,14 @@ def test_an_op_in_its_own_unit_is_no_percent() -> None:
     assert "has gone back by 3.00 units" in page
     assert "takes 50 % of OP" in page
     assert "OP of V1, OP&#x27;s own unit" in page
-    assert (
-        in_op_unit("by 2 %, which is 5 % of OP's range", "%")
-        == "by 2 %, which is 5 % of OP's range"
-    )
+    assert Units("bar").said("2 %, 5 % of OP, 1 PV units") == "2 %, 5 % of OP, 1 bar"
+    assert Units("bar", "OP").said("2 %, 5 % of OP, 3 % of travel") == "2 units, 5 % of OP, 3 units"
 
 
 def test_the_page_of_a_loop_says_why_and_what_next(loop_file: Path) -> None:
     source = loop_file.read_text(encoding="utf-8")
     assert "rests until OP has gone back by 3.00 %, and then jumps by 1.00 % or more." in source
-    assert "Next: Have V1 serviced (packing and positioner first), unless <code>" in source
+    assert "next:</b> Have V1 serviced (packing and positioner first), unless <code>" in source
     assert "imulated" not in source.partition("<table")[0]  # what was not stands in the table
 
 

@@ -158,4 +158,4 @@ def _held(at: list[int], told: Mapping[int, tuple[float, ...]], width: int) -> F
 
 
 def _units(story: Story) -> Units:
-    return Units("PV units", "% of travel", {k: text(v) for k, v in story.units.items()})
+    return Units(outputs={k: text(v) for k, v in story.units.items()})

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,10 +16,12 @@ from stiction_ros.pages.plot import Curve, over_time
 from stiction_ros.pages.signals import Units
 from stiction_ros.records.record import Record
 from stiction_ros.report.page import Cell, card, duration, interval, number, percent, table
-from stiction_ros.report.run.story import Story
 from stiction_ros.signals.free_run import step_response as answer_to_step
 from stiction_ros.signals.polynomials import largest_root
 from stiction_ros.texts import probability, symbol
+
+if TYPE_CHECKING:
+    from stiction_ros.report.run.story import Story  # it loads the controllers
 
 KINDS = {"sticky": "bad", "backlash": "bad", "healthy": "good"}  # of boxes; others are open
 
@@ -51,7 +53,7 @@ def has_friction(valve: Mapping[str, Any]) -> bool:
     return VerdictKind(valve["verdict"]).has_friction
 
 
-def valve_cards(valves: Sequence[Mapping[str, Any]], story: Story | None = None) -> str:
+def valve_cards(valves: Sequence[Mapping[str, Any]], story: "Story | None" = None) -> str:
     """Return one box a valve: verdict, friction with intervals, and the truth where known."""
     boxes = []
     for valve in valves:

@@ -1,7 +1,6 @@
 """Figures in words, alike on all pages."""
 
 import math
-import re
 
 CAUSES = {
     "valve": "its valve",
@@ -40,11 +39,6 @@ def op_figure(value: float | None, op_unit: str) -> str:
     """Return a figure with the unit of OP behind it; nothing where there is none."""
     shown = figure(value)
     return shown and f"{shown} {'%' if op_unit == PERCENT else 'units'}"
-
-
-def in_op_unit(sentence: str, op_unit: str) -> str:
-    """Return a sentence whose % of OP are units where OP has its own; shares ``% of`` stay."""
-    return sentence if op_unit == PERCENT else re.sub(r"(\d) %(?! of\b)", r"\1 units", sentence)
 
 
 def cause_words(cause: str | None) -> str:

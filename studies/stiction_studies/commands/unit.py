@@ -20,7 +20,7 @@ Outcome = dict[str, Any]
 def run_seed(scenario: "UnitScenario", seed: int, *, ideal_valves: bool) -> Outcome:
     """Run one seed; a plain function, so that a worker process can run it."""
     from stiction_ros.online.unit import run_unit
-    from stiction_ros.report.run.unit import unit_report, unit_rows
+    from stiction_ros.survey.unit import unit_report, unit_rows
 
     runs = run_unit(scenario, seed=seed, ideal_valves=ideal_valves)
     logs = {name: log_of(live) for name, live in runs.items()}
@@ -53,7 +53,7 @@ def run(scenario: "UnitScenario", options: argparse.Namespace) -> int:
 
 
 def _print(name: str, outcomes: list[Outcome]) -> None:
-    from stiction_ros.report.run.unit import UNIT_COLUMNS
+    from stiction_ros.survey.unit import UNIT_COLUMNS
 
     table = Table("seed", "swap", "trusted", *UNIT_COLUMNS, title=name, title_justify="left")
     for one in outcomes:
