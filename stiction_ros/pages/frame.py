@@ -187,11 +187,3 @@ def words(value: object) -> str:
 def listed(lines: Iterable[object]) -> str:
     """Return lines of words as a list."""
     return "<ul>" + "".join(f"<li>{text(line)}</li>" for line in lines) + "</ul>"
-
-
-def card(what: str, big: str, more: str = "", kind: str = "") -> str:
-    """Return a box with one result, given as HTML; ``kind`` is bad, good, open or nothing."""
-    return (
-        f'<div class="card {kind}"><div class="what">{what}</div><div class="big">{big}</div>'
-        f'<div class="more">{more}</div></div>'
-    )

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.pages import frame
 from stiction_ros.pages.frame import SCROLLED, text, words
 from stiction_ros.texts import json_text
 
@@ -32,9 +31,12 @@ def count(value: object) -> str:
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else "–"
 
 
-def card(kind: str, what: str, big: str, more: str) -> str:
-    """Return a box with one result; ``kind`` is bad, good or open."""
-    return frame.card(text(what), text(big), words(more), kind)
+def card(kind: str, what: str, big: str, more: str = "") -> str:
+    """Return a box with one result; ``kind`` is bad, good, open or nothing."""
+    return (
+        f'<div class="card {kind}"><div class="what">{text(what)}</div>'
+        f'<div class="big">{text(big)}</div><div class="more">{words(more)}</div></div>'
+    )
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Cell]], texts: int = 1) -> str:

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from stiction_ros.pages.frame import SCROLLED, card, framed, text, words
+from stiction_ros.pages.frame import SCROLLED, framed, text, words
+from stiction_ros.report.page import card
 from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.listing.columns import COST, Column, columns_of
 from stiction_ros.survey.listing.headline import Earlier, changed, headline, kind_of, worked
@@ -75,7 +76,7 @@ def _how(survey: Survey) -> str:
 def _counts(entries: Sequence[Entry]) -> str:
     kinds = ("sticky", "backlash", "undecided", "healthy", "skipped", "failed")
     counts = {kind: sum(kind_of(entry) == kind for entry in entries) for kind in kinds}
-    return "".join(card(text(kind), str(count)) for kind, count in counts.items() if count)
+    return "".join(card("", kind, str(count)) for kind, count in counts.items() if count)
 
 
 def _tools(entries: Sequence[Entry]) -> str:
