@@ -99,6 +99,7 @@ async def fetch(
     except (OSError, TimeoutError, ua.UaError) as error:
         raise InputError(describe(error), where=url) from None
     found: dict[str, History] = {}
+    tag = "all tags"
     try:
         nodes = await node_ids(client, list(files))
         for tag, path in files.items():
