@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from stiction_ros.effects.behaviour import FloatArray, Memory
-from stiction_ros.effects.friction.moving_rules import FollowingRules
+from stiction_ros.effects.friction.moving_rules import MovingRules
 from stiction_ros.effects.friction.stiction import NOT_SEARCHED, JumpForm, SlipJumpPair, Switching
 
 
@@ -42,7 +42,7 @@ class KanoStiction(SlipJumpPair):
 
     law: ClassVar[str | None] = "kano"
     not_searched: ClassVar[str] = NOT_SEARCHED
-    switching: ClassVar[Switching] = FollowingRules
+    switching: ClassVar[Switching] = MovingRules
     kernel: ClassVar[str] = "following_stems"
 
     def rest(self, value: float) -> Memory:

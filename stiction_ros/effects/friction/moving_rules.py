@@ -16,8 +16,8 @@ Before the first slip the threshold is f_S for all of them.
 """
 
 import dataclasses
-from abc import ABC, abstractmethod
 from collections.abc import Iterable
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,25 +36,30 @@ class MovingTrace:
     bounds: tuple[float, float, float, float]  # (J low, J high, S low, S high), %
 
 
-class MovingRules(ABC):
-    """How a valve with a moving state follows OP u, shape (N,)."""
+class MovingRules:
+    """How a valve with a moving state follows OP u, shape (N,): by Kano's law and XCH's."""
+
+    waits: ClassVar[bool] = False  # whether it slips only where OP has run on for a sample
 
     def __init__(self, u: FloatArray) -> None:
+        slope = np.sign(np.diff(u, prepend=u[:1]))
         self.u = u
         self.values: list[float] = u.tolist()
-        self.changes: list[float] = np.diff(u, prepend=u[:1]).tolist()
+        self.slopes: list[float] = slope.tolist()
+        self._may_slip = np.ones(len(u), dtype=bool)
+        if self.waits:
+            self._may_slip[:2] = False
+            self._may_slip[2:] = (slope[2:] == slope[1:-1]) & (slope[2:] != 0.0)
 
-    @abstractmethod
     def resting_samples(self, level: float) -> NDArray[np.bool_]:
-        """Return at which samples a valve that rests at ``level`` may slip, shape (N,)."""
+        """Return at which samples a valve that rests at ``level`` may slip, shape (N,).
 
-    @abstractmethod
-    def direction(self, k: int, level: float) -> float:
-        """Return the direction of a first slip at sample k from ``level``, ±1."""
-
-    @abstractmethod
-    def follow(self, trace: "Recorder", first: FirstSlip, jump: float, reverse: float) -> None:
-        """Follow OP behind the first slip with the given J and S, %."""
+        OP came to the first sample from there.
+        """
+        may = self._may_slip.copy()
+        if self.waits and len(may) > 1:
+            may[1] = self.slopes[1] == np.sign(self.values[0] - level) != 0.0
+        return may
 
     def first_slip(self, level: float, static: float) -> FirstSlip:
         """Return sample and direction of the first slip; (N, 0) when there is none."""
@@ -62,7 +67,8 @@ class MovingRules(ABC):
         slips = np.flatnonzero(beyond & self.resting_samples(level))
         if not len(slips):
             return len(self.u), 0.0
-        return int(slips[0]), self.direction(int(slips[0]), level)
+        k = int(slips[0])
+        return k, self.slopes[k] if self.waits else float(np.sign(self.values[k] - level))
 
     def trace(
         self, point: Iterable[float], level: float, first: FirstSlip | None = None
@@ -77,8 +83,43 @@ class MovingRules(ABC):
         trace = Recorder(len(self.values), level)
         if first[0] < len(self.values):
             trace.move(first[0], self.values[first[0]], first[1])
-            self.follow(trace, first, jump, reverse)
+            self._follow(trace, first, jump, reverse)
         return trace.result()
+
+    def _follow(self, trace: "Recorder", first: FirstSlip, jump: float, reverse: float) -> None:
+        """Follow OP behind the first slip with the given J and S, %."""
+        (begin, sign), moving, rested = first, True, False
+        base, values, slopes = self.values[begin], self.values, self.slopes
+        low, high = trace.low, trace.high
+        for k in range(begin + 1, len(values)):
+            value, slope = values[k], slopes[k]
+            if moving and slope == sign:
+                base = value
+                trace.move(k, value, sign)
+                continue
+            lead = sign * (value - base)
+            onwards, turned = lead > 0.0, sign if lead > 0.0 else -sign
+            if self.waits:
+                if moving:
+                    moving, rested = False, slope == 0.0
+                    continue
+                if slope == 0.0 or slope != slopes[k - 1]:
+                    continue
+                onwards, turned = rested and slope == sign, slope
+            way = 0 if onwards else 1  # compared with J or with S
+            moving, far = False, abs(lead)
+            if far > (reverse if way else jump):
+                high[way] = min(high[way], far)
+                moving, sign, base = True, turned, value
+                trace.move(k, value, sign)
+            elif far > low[way]:
+                low[way] = far
+
+
+class SlopeRules(MovingRules):
+    """Those of Choudhury's law."""
+
+    waits = True
 
 
 class Recorder:
@@ -103,85 +144,3 @@ class Recorder:
             np.repeat(self.signs, lengths),
             (self.low[0], self.high[0], self.low[1], self.high[1]),
         )
-
-
-class FollowingRules(MovingRules):
-    """Kano's law and XCH."""
-
-    def resting_samples(self, level: float) -> NDArray[np.bool_]:
-        return np.ones(len(self.u), dtype=bool)
-
-    def direction(self, k: int, level: float) -> float:
-        return float(np.sign(self.values[k] - level))
-
-    def follow(self, trace: Recorder, first: FirstSlip, jump: float, reverse: float) -> None:
-        (begin, sign), moving = first, True
-        base, values, changes = self.values[begin], self.values, self.changes
-        low, high = trace.low, trace.high
-        for k in range(begin + 1, len(values)):
-            value = values[k]
-            if moving and sign * changes[k] > 0.0:
-                base = value
-                trace.move(k, value, sign)
-                continue
-            lead = sign * (value - base)
-            moving = True
-            if lead > jump:
-                high[0] = min(high[0], lead)
-            elif -lead > reverse:
-                high[1] = min(high[1], -lead)
-                sign = -sign
-            else:
-                moving = False
-                if lead > low[0]:
-                    low[0] = lead
-                elif -lead > low[1]:
-                    low[1] = -lead
-                continue
-            base = value
-            trace.move(k, value, sign)
-
-
-class SlopeRules(MovingRules):
-    """Choudhury's law."""
-
-    def __init__(self, u: FloatArray) -> None:
-        super().__init__(u)
-        slope = np.sign(np.diff(u, prepend=u[:1]))
-        self.slopes: list[float] = slope.tolist()
-        self.steady = np.zeros(len(u), dtype=bool)
-        self.steady[2:] = (slope[2:] == slope[1:-1]) & (slope[2:] != 0.0)
-
-    def resting_samples(self, level: float) -> NDArray[np.bool_]:
-        """Return the samples at which OP runs on; at the first it came from ``level``."""
-        steady = self.steady.copy()
-        if len(steady) > 1:
-            steady[1] = self.slopes[1] == np.sign(self.values[0] - level) != 0.0
-        return steady
-
-    def direction(self, k: int, level: float) -> float:
-        return self.slopes[k]
-
-    def follow(self, trace: Recorder, first: FirstSlip, jump: float, reverse: float) -> None:
-        (begin, sign), moving, rested = first, True, False
-        base, values, slopes = self.values[begin], self.values, self.slopes
-        low, high = trace.low, trace.high
-        for k in range(begin + 1, len(values)):
-            value, slope = values[k], slopes[k]
-            if moving and slope == sign:
-                base = value
-                trace.move(k, value, sign)
-                continue
-            if moving:
-                moving, rested = False, slope == 0.0
-                continue
-            if slope == 0.0 or slope != slopes[k - 1]:
-                continue
-            way = 0 if rested and slope == sign else 1  # compared with J or with S
-            far = abs(value - base)
-            if far > (reverse if way else jump):
-                high[way] = min(high[way], far)
-                moving, sign, base = True, slope, value
-                trace.move(k, value, sign)
-            elif far > low[way]:
-                low[way] = far

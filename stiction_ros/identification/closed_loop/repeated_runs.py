@@ -7,7 +7,7 @@ import numpy as np
 
 from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.effects.friction.moving_rules import FollowingRules
+from stiction_ros.effects.friction.moving_rules import MovingRules
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run, set_points_of
 from stiction_ros.identification.friction import find_law
 from stiction_ros.identification.result import ValveEstimate
@@ -26,7 +26,7 @@ def law_of(valve: ValveEstimate) -> tuple[float, float, float]:
     """Return what the runs are told of a valve's law; of one without a known form, He's."""
     law = find_law(valve.law)
     if isinstance(law.switching, type):
-        return (1.0, 0.0, 1.0) if law.switching is FollowingRules else (0.0, 1.0, 1.0)
+        return (1.0, 0.0, 1.0) if law.switching is MovingRules else (0.0, 1.0, 1.0)
     friction = valve.behaviour()
     form = friction.jump_form() if isinstance(friction, Stiction) else None
     return 0.0, 0.0, 1.0 if form is None else form.overshoot
