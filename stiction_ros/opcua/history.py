@@ -164,9 +164,10 @@ def record_of(tags: LoopTags, found: Mapping[str, History], span: Span) -> Recor
     jitter, half = tags.sample_ns // JITTER, tags.sample_ns // 2
     pv = [found[output.pv] for output in tags.outputs]
     op = [found[valve.op_read] for valve in tags.valves]
-    for told, one in zip((*pv, *op), (*tags.outputs, *tags.valves), strict=True):
+    names = [one.name for one in tags.outputs] + [one.name for one in tags.valves]
+    for told, name in zip((*pv, *op), names, strict=True):
         if not told:
-            raise InputError(f"no history of {one.name}", where=f"loop {tags.loop}")
+            raise InputError(f"no history of {name}", where=f"loop {tags.loop}")
     first = max(history[0].stamp for history in pv)
     first += max(-(-(span.begin - first) // tags.sample_ns), 0) * tags.sample_ns
     end = min(span.end, max(history[-1].stamp for history in (*pv, *op)))

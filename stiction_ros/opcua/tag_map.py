@@ -6,12 +6,10 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.loop.yaml_reading import Section, load_yaml
-
-T = TypeVar("T")
 
 _NODE = re.compile(r"(ns=\d+;|nsu=[^;]+;)?[isgb]=.+")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -33,8 +31,8 @@ def _said(read: Callable[[Section, str], object], default: object = dataclasses.
     return dataclasses.field(default=default, metadata={"read": read})
 
 
-def _read(kind: type[T], section: Section) -> T:
-    """Return what a section says; InputError at what is wrong, lacking or unknown."""
+def _read(kind: type[Any], section: Section) -> Any:
+    """Return a ``kind`` of what a section says; InputError at what is wrong or unknown."""
     found = {
         field.name: field.metadata["read"](section, field.name)
         for field in dataclasses.fields(kind)
