@@ -38,26 +38,18 @@ def identity_of(beat: float) -> int:
 
 
 class HeardBeat:
-    """Someone's beat: when it changed last."""
+    """Someone's beat, and when it changed last, s; minus infinity before."""
 
     def __init__(self) -> None:
         self._value: float | None = None
-        self._changed_at: float | None = None
+        self.changed_at = -np.inf
 
     def hear(self, value: float, now: float, first: bool) -> None:
         """Take in a beat at ``now``, s; the ``first`` report of a subscription is no change."""
         if value != self._value:
             self._value = value
             if not first:
-                self._changed_at = now
-
-    def silent_for(self, now: float, since: float) -> float:
-        """Return s since the last beat, or since ``since`` when that is later."""
-        return now - max(since, self._changed_at if self._changed_at is not None else since)
-
-    def beats(self, now: float, within: float) -> bool:
-        """Return whether it has changed in the last ``within`` s."""
-        return self._changed_at is not None and now - self._changed_at <= within
+                self.changed_at = now
 
 
 @dataclasses.dataclass(frozen=True)
@@ -211,7 +203,7 @@ class LoopBridge:
 
     def _foreign_beats(self, now: float) -> bool:
         assert self.tags.grant is not None
-        return self._foreign.beats(now, self.tags.grant.watchdog)
+        return now - self._foreign.changed_at <= self.tags.grant.watchdog
 
     def _fault(self, now: float) -> str:
         """Return what speaks against writing; empty for nothing."""
@@ -224,7 +216,7 @@ class LoopBridge:
         if self._foreign_beats(now):
             return "another one lets the heartbeat rise"
         since = self._alive_since
-        if told.alive and self._plant.silent_for(now, since) > told.watchdog:
+        if told.alive and now - max(since, self._plant.changed_at) > told.watchdog:
             return "the plant's heartbeat stands still"
         if self._bad >= PATIENCE or self._stamp is None:
             return "PV of bad quality" if self._stamp is not None else "no sample yet"
