@@ -70,8 +70,8 @@ class Figures:
     ruled_out: float = _figure(
         "nats",
         "log likelihood of an ideal valve minus that of the best friction large enough to matter, "
-        "at the rate of sampling that speaks most against friction",
-        "one rate of sampling speaks against it",
+        "at the rate of sampling that speaks most for friction",
+        "an ideal valve explains PV as well at every rate of sampling",
         -1,
     )
     repeats: float = _figure(
@@ -87,23 +87,29 @@ class Figures:
         "the simulated loop moves nearly as much without it",
         1,
     )
-    moves: float = _figure(
+    stem_rest: float = _figure(
         "count",
-        "samples at which the estimated stem moves",
-        "the estimated stem moves too seldom, or in nearly every sample",
+        "rows from one reversal of the estimated stem to the next, in the mean",
+        "the estimated stem turns too seldom, or in nearly every row",
     )
     controller_fit: float = _figure(
         "R²", "fit of the recovered controller to OP's moves", "the controller is hardly known"
     )
-    band_share: float = _figure(
-        "ratio",
-        "f_S + f_D divided by the range in which OP moves",
-        "its band is hardly of a size that makes this loop move",
-    )
-    cycle_share: float = _figure(
+    band_width: float = _figure(
         "share",
-        "part of the variance of PV − SP that belongs to one cycle",
-        "the cycle is not of the kind that friction makes",
+        "width of the interval of f_S + f_D, divided by its upper end",
+        "its size is hardly known",
+    )
+    op_unevenness: float = _figure(
+        "ratio",
+        "standard deviation of the lengths of OP's half cycles, divided by their mean",
+        "OP keeps time as under a wave from outside, or no time at all",
+    )
+    op_kurtosis: float = _figure(
+        "ratio",
+        "mean fourth power of OP about its mean over its squared variance: square wave 1, "
+        "sine 1.5, triangle 1.8, noise 3",
+        "OP has another shape than friction gives it",
     )
 
     def to_dict(self) -> dict[str, float]:
@@ -161,17 +167,15 @@ def friction_probability(figures: Figures, model: Model | None = None) -> float:
     return 1.0 / (1.0 + math.exp(-start - sum(contributions(figures, model).values())))
 
 
-def verdict_of(probability: float, figures: Figures, deadband: bool) -> VerdictKind:
+def verdict_of(probability: float, responds: bool, deadband: bool) -> VerdictKind:
     """Return the verdict by a probability.
 
     Args:
-        probability: of friction.
-        figures: a valve is healthy only where the record also rules out friction that would
-            matter: an ideal valve must be 1 / (1 − :data:`SURE`) times as likely at each rate.
+        probability: of friction that is large enough to matter.
+        responds: whether PV answers the valve; a stem that may be stuck is not healthy.
         deadband: whether the friction has no jump.
     """
     if probability >= SURE:
         return VerdictKind.BACKLASH if deadband else VerdictKind.STICKY
-    if probability <= 1.0 - SURE and figures.ruled_out >= -math.log(1.0 - SURE):
-        return VerdictKind.HEALTHY
-    return VerdictKind.UNDECIDED
+    healthy = probability <= 1.0 - SURE and responds
+    return VerdictKind.HEALTHY if healthy else VerdictKind.UNDECIDED

@@ -51,17 +51,16 @@ def test_a_figure_that_has_a_sign_acts_in_that_direction(
 
 
 @pytest.mark.parametrize(
-    ("probability", "ruled_out", "deadband", "verdict"),
+    ("probability", "responds", "deadband", "verdict"),
     [
-        (SURE, 0.0, False, VerdictKind.STICKY),
-        (SURE, 0.0, True, VerdictKind.BACKLASH),
-        (0.9, 5.0, False, VerdictKind.UNDECIDED),
-        (0.04, 5.0, False, VerdictKind.HEALTHY),
-        (0.04, -1.0, False, VerdictKind.UNDECIDED),
+        (SURE, True, False, VerdictKind.STICKY),
+        (SURE, True, True, VerdictKind.BACKLASH),
+        (0.9, True, False, VerdictKind.UNDECIDED),
+        (0.04, True, False, VerdictKind.HEALTHY),
+        (0.04, False, False, VerdictKind.UNDECIDED),
     ],
 )
 def test_a_verdict_is_a_cut(
-    probability: float, ruled_out: float, deadband: bool, verdict: VerdictKind
+    probability: float, responds: bool, deadband: bool, verdict: VerdictKind
 ) -> None:
-    told = Figures(**{**dict.fromkeys(definitions(), 0.0), "ruled_out": ruled_out})
-    assert verdict_of(probability, told, deadband) is verdict
+    assert verdict_of(probability, responds, deadband) is verdict

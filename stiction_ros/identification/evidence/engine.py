@@ -172,7 +172,7 @@ def _judged(
     Where friction is not sure the intervals begin at 0; a healthy valve has none.
     """
     probability = friction_probability(figures)
-    verdict = verdict_of(probability, figures, estimate.jump == 0.0)
+    verdict = verdict_of(probability, estimate.responds, estimate.jump == 0.0)
     judged = dataclasses.replace(
         estimate,
         verdict=verdict,

@@ -14,12 +14,13 @@ from stiction_ros.identification.evidence.output_fit import fit_output
 from stiction_ros.identification.evidence.rates import Agreement, Look
 from stiction_ros.identification.judgement import Figures
 from stiction_ros.signals.autoregression import innovations
+from stiction_ros.signals.oscillation import turnings
 
 SHORTEST = NOISE_ORDER + 4  # rows of a turn: the noise model describes shorter ones
 LONGEST = 0.25  # of the rows
 SPREADS = ((1.0,), (0.25, 0.5, 0.25))
 """Weights of neighbouring lags, as turns are not of one length."""
-ENDLESS = 100.0  # ratio that stands for a movement that grows without end
+ENDLESS = 100.0  # unevenness of an OP that has no two half cycles
 FEW = 2.0
 """Nats added to a gain of which a ratio is taken: what two parameters gain by chance."""
 
@@ -101,18 +102,38 @@ def figures_of(
     material = [0.5 * look.accepted[valve].material_gain for look in sees]
     repeated = max(echo(look.problem, look.found.without[valve]) for look in seen)
     loop = closed.valves[valve]
-    output = next((one for one in closed.outputs if one.name == loop.output), closed.outputs[0])
     beyond = 0.5 * min(agreed.gain, 2.0 * max(gains))
+    low, high = agreed.look.accepted[valve].band
+    unevenness, kurtosis = shape_of(seen[0].problem.op[valve])
     return Figures(
         gain=beyond if agreed.alike else min(beyond, 0.0),
-        ruled_out=-min(material),
+        ruled_out=-max(material),
         repeats=0.5 * repeated / (max(gains) + FEW),
         loop_gone=loop.gone,
-        moves=float(np.count_nonzero(np.diff(agreed.look.found.best.stems[valve]))),
+        stem_rest=agreed.look.problem.rows / max(_runs(agreed.look.found.best.stems[valve]), 1),
         controller_fit=0.0 if loop.controller is None else loop.controller.r_squared,
-        band_share=min(loop.band_share, ENDLESS),
-        cycle_share=0.0 if output.oscillation is None else output.oscillation.share,
+        band_width=1.0 - low / high if high > 0.0 else 0.0,
+        op_unevenness=unevenness,
+        op_kurtosis=kurtosis,
     )
+
+
+def _runs(stem: FloatArray) -> int:
+    """Return how many times a stem, shape (n,), moves on in one direction before it turns."""
+    ways = np.sign(np.diff(stem))
+    ways = ways[ways != 0.0]
+    return int(np.count_nonzero(np.diff(ways))) + min(len(ways), 1)
+
+
+def shape_of(op: FloatArray) -> tuple[float, float]:
+    """Return how uneven the half cycles of OP are, and its kurtosis; OP moves, shape (n,).
+
+    A half cycle ends where OP goes beyond half its standard deviation on the other side.
+    """
+    away = (op - op.mean()) / op.std()
+    halves = np.diff(turnings(away, 0.5))
+    uneven = float(halves.std() / halves.mean()) if len(halves) > 1 else ENDLESS
+    return uneven, float(np.mean(away**4))
 
 
 def _gain(look: Look, silent: float, valve: int) -> float:

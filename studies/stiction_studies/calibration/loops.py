@@ -13,13 +13,13 @@ class KnownLoop:
     """One record and its truth."""
 
     record: Record  # as the package reads it
-    # whether the valve has friction that matters and shows; None where it has some that shows in
-    # too few slips
+    # whether the last valve has friction that matters and shows; None where it has some that shows
+    # in too few slips
     friction: bool | None
 
 
-def _plain(seed: int, quiet: bool = False, cascade: bool = False) -> KnownLoop:
-    loop = plain_loop(seed, quiet=quiet, cascade=cascade)
+def _plain(seed: int, **circumstances: bool) -> KnownLoop:
+    loop = plain_loop(seed, **circumstances)
     return KnownLoop(loop.record, loop.friction)
 
 
@@ -37,4 +37,6 @@ WORLDS: Mapping[str, Callable[[int], KnownLoop]] = {
     "plain": _plain,
     "quiet": functools.partial(_plain, quiet=True),
     "cascade": functools.partial(_plain, cascade=True),
+    "waves": functools.partial(_plain, waves=True),
+    "pair": functools.partial(_plain, pair=True),
 }

@@ -17,6 +17,7 @@ from stiction_ros.records.record import Record
 LAWS = ("he", "kano", "choudhury", "mechanics", "deadband")
 SENSORS = ("plain", "stale", "wireless", "exception", "rounded")
 LOADS = ("walk", "coloured", "steps", "sine", "square", "triangle", "drifting_cycle")
+WAVES = ("sine", "square", "triangle")
 MASTERS = ("walk", "coloured", "steps", "sine")
 SUBSTEPS = 40  # of the stem's mechanics in a sample
 HUSH, LITTLE = 0.2, 0.1  # of noise and load on a quiet loop: a valve makes a plain limit cycle
@@ -47,6 +48,7 @@ class PlainLoop:
     sensor: str
     load: str
     controller: str
+    stem: FloatArray  # shape (N,), % about 50 %
 
     @property
     def friction(self) -> bool | None:
@@ -63,6 +65,8 @@ def plain_loop(
     sensor: str | None = None,
     quiet: bool = False,
     cascade: bool = False,
+    waves: bool = False,
+    pair: bool = False,
 ) -> PlainLoop:
     """Return the loop of a seed.
 
@@ -72,8 +76,11 @@ def plain_loop(
         sensor: of :data:`SENSORS`; drawn where None.
         quiet: whether little but the valve moves the loop.
         cascade: whether a master moves SP and the record has no SP.
+        waves: whether the load is a regular wave, large beside a valve without friction.
+        pair: whether the valve of another loop, the first of the record, moves PV as well.
     """
-    random = np.random.default_rng([seed, 4711, int(quiet) + 2 * int(cascade)])
+    world = int(quiet) + 2 * int(cascade) + 4 * int(waves) + 8 * int(pair)
+    random = np.random.default_rng([seed, 4711, world])
     drawn = random.choice(["none", "stuck", *LAWS], p=[0.47, 0.03, 0.14, 0.1, 0.1, 0.1, 0.06])
     law = law or str(drawn)
     kept = str(random.choice(SENSORS, p=[0.5, 0.14, 0.12, 0.12, 0.12]))
@@ -88,8 +95,14 @@ def plain_loop(
     band = _log(random, 1.0, 10.0) if law in LAWS else 0.0
     static = band / (2.0 - random.uniform(0.1, 0.8)) if law != "deadband" else 0.5 * band
     load = str(random.choice(LOADS, p=[0.3, 0.2, 0.1, 0.12, 0.1, 0.08, 0.1]))
+    load = str(random.choice(WAVES)) if waves else load
+    neighbour = None
+    if pair:
+        neighbour = plain_loop(seed, str(random.choice(["none", *LAWS])))
+        count = LEAD + len(neighbour.stem)
     outside = _load(random, load, count, lag + delay)
     size = band * random.uniform(0.1, 0.6) if band else _log(random, 0.3, 4.0)
+    size = 2.0 * size if waves else size
     loop = _Loop(kind, lag, delay, gain, patience, controller, law, static, band - static)
     hush = HUSH if quiet else 1.0
     size = LITTLE * size if quiet else size
@@ -103,11 +116,13 @@ def plain_loop(
         moves = _set_points(random, count, swing)
     push = np.zeros(count)
     push[:50] = 2.0 * band  # sets a cycle going
+    if neighbour is not None:
+        push += _log(random, 0.1, 1.0) * _lagged(neighbour.stem, _log(random, 0.3, 3.0) * lag)
     told = loop.run(size * outside + push, noise, moves, Sensor(sensor, random, gain))
     op, stem, pv = (signal[LEAD:] for signal in told)
     span = float(np.subtract(*np.percentile(op, [98.0, 2.0])))
     record = Record(
-        name=f"{'quiet' if quiet else 'cascade' if cascade else 'plain'}{seed:05d}",
+        name=f"{ {0: 'plain', 1: 'quiet', 2: 'cascade', 4: 'waves', 8: 'pair'}[world] }{seed:05d}",
         sample_time=1.0,
         valves=("V1",),
         outputs=("PV1",),
@@ -115,10 +130,30 @@ def plain_loop(
         pv=(20.0 + pv)[:, None],
         sp=None if cascade else (20.0 + moves[LEAD:])[:, None],
     )
+    if neighbour is not None:
+        record = _joined(neighbour.record, record)
     slips = _slips(stem, max(0.25 * (2.0 * static - band), 0.02 * band))
     return PlainLoop(
-        record, law, band, 2.0 * static - band, slips, span, sensor, load, controller
+        record, law, band, 2.0 * static - band, slips, span, sensor, load, controller, stem
     )  # fmt: skip
+
+
+def _joined(first: Record, second: Record) -> Record:
+    columns = {
+        name: np.hstack([getattr(first, name), getattr(second, name)])
+        for name in ("op", "pv", "sp")
+    }
+    return dataclasses.replace(second, valves=("V1", "V2"), outputs=("PV1", "PV2"), **columns)
+
+
+def _lagged(stem: FloatArray, lag: float) -> FloatArray:
+    """Return the stem behind a lag, with its mean before it, shape (LEAD + N,)."""
+    share, value = math.exp(-1.0 / lag), 0.0
+    out = np.zeros(LEAD + len(stem))
+    for k, way in enumerate((stem - stem.mean()).tolist(), LEAD):
+        value = share * value + (1.0 - share) * way
+        out[k] = value
+    return out
 
 
 @dataclasses.dataclass(frozen=True)
