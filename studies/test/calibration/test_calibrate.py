@@ -14,7 +14,7 @@ from stiction_studies.commands import calibrate
 
 
 def test_the_command_offers_every_world() -> None:
-    assert set(calibrate.NAMES) == set(WORLDS)
+    assert set(calibrate.SEEDS) == set(WORLDS)
 
 
 @pytest.mark.parametrize("world", [name for name in WORLDS if name != "field"])
