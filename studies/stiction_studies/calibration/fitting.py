@@ -24,7 +24,6 @@ SHRUNK = 4.0
 """Penalty of the squared values of leaves. In eight-fold trials on six worlds it gives the least
 loss; with 2, one in a hundred more is found, and a quarter more wrongly."""
 FOLDS = 8
-BINS = 10  # of probability, in which it is held against what is true
 
 
 @dataclasses.dataclass(frozen=True)
@@ -107,26 +106,6 @@ def loss(told: FloatArray, rows: Sequence[Judged]) -> float:
     truth = np.array([row.friction for row in rows])
     right = np.where(truth, told, 1.0 - told)
     return float(-np.log(np.maximum(right, 1e-12)).mean())
-
-
-@dataclasses.dataclass(frozen=True)
-class Bin:
-    """Loops whose probability lies in one tenth: their number, its mean, their true share."""
-
-    loops: int
-    told: float
-    true: float
-
-
-def reliability(told: FloatArray, rows: Sequence[Judged]) -> list[Bin]:
-    """Return how what was told is true, in :data:`BINS` bins; empty ones are left out."""
-    truth = np.array([row.friction for row in rows], dtype=float)
-    place = np.minimum((told * BINS).astype(int), BINS - 1)
-    return [
-        Bin(int(inside.sum()), float(told[inside].mean()), float(truth[inside].mean()))
-        for k in range(BINS)
-        if (inside := place == k).any()
-    ]
 
 
 def counts(told: FloatArray, rows: Sequence[Judged]) -> dict[str, float]:

@@ -17,7 +17,6 @@ from stiction_ros.records.record import Record
 LAWS = ("he", "kano", "choudhury", "mechanics", "deadband")
 SENSORS = ("plain", "stale", "wireless", "exception", "rounded")
 LOADS = ("walk", "coloured", "steps", "sine", "square", "triangle", "drifting_cycle")
-WAVES = ("sine", "square", "triangle")
 MASTERS = ("walk", "coloured", "steps", "sine")
 SUBSTEPS = 40  # of the stem's mechanics in a sample
 HUSH, LITTLE = 0.2, 0.1  # of noise and load on a quiet loop: a valve makes a plain limit cycle
@@ -28,26 +27,14 @@ MATTERS = 0.1  # band over the range of OP, least of a friction that matters
 
 @dataclasses.dataclass(frozen=True)
 class PlainLoop:
-    """One recorded loop and the truth.
+    """One recorded loop and the truth."""
 
-    Attributes:
-        record: OP, PV and SP.
-        law: of the friction; ``none`` without, ``stuck`` where the stem stands still.
-        band, jump: f_S + f_D and f_S − f_D (of a stem with mass: of its forces), %.
-        slips: of the stem over the record.
-        op_range: of OP, 2 % to 98 %.
-        sensor, load, controller: names of what stands around the valve.
-    """
-
-    record: Record
-    law: str
-    band: float
-    jump: float
-    slips: int
-    op_range: float
-    sensor: str
-    load: str
-    controller: str
+    record: Record  # OP, PV and SP
+    law: str  # of the friction; none without, stuck where the stem stands still
+    band: float  # f_S + f_D, % (of a stem with mass: of its forces)
+    jump: float  # f_S − f_D, likewise
+    slips: int  # of the stem over the record
+    op_range: float  # of OP, 2 % to 98 %
     stem: FloatArray  # shape (N,), % about 50 %
 
     @property
@@ -95,7 +82,7 @@ def plain_loop(
     band = _log(random, 1.0, 10.0) if law in LAWS else 0.0
     static = band / (2.0 - random.uniform(0.1, 0.8)) if law != "deadband" else 0.5 * band
     load = str(random.choice(LOADS, p=[0.3, 0.2, 0.1, 0.12, 0.1, 0.08, 0.1]))
-    load = str(random.choice(WAVES)) if waves else load
+    load = str(random.choice(LOADS[3:6])) if waves else load
     neighbour = None
     if pair:
         neighbour = plain_loop(seed, str(random.choice(["none", *LAWS])))
@@ -117,7 +104,10 @@ def plain_loop(
     push = np.zeros(count)
     push[:50] = 2.0 * band  # sets a cycle going
     if neighbour is not None:
-        push += _log(random, 0.1, 1.0) * _lagged(neighbour.stem, _log(random, 0.3, 3.0) * lag)
+        much = _log(random, 0.1, 1.0)
+        share = math.exp(-1.0 / (_log(random, 0.3, 3.0) * lag))
+        away = neighbour.stem - neighbour.stem.mean()
+        push[LEAD:] += much * _filtered(away, share, 1.0 - share)
     told = loop.run(size * outside + push, noise, moves, Sensor(sensor, random, gain))
     op, stem, pv = (signal[LEAD:] for signal in told)
     span = float(np.subtract(*np.percentile(op, [98.0, 2.0])))
@@ -133,9 +123,7 @@ def plain_loop(
     if neighbour is not None:
         record = _joined(neighbour.record, record)
     slips = _slips(stem, max(0.25 * (2.0 * static - band), 0.02 * band))
-    return PlainLoop(
-        record, law, band, 2.0 * static - band, slips, span, sensor, load, controller, stem
-    )  # fmt: skip
+    return PlainLoop(record, law, band, 2.0 * static - band, slips, span, stem)
 
 
 def _joined(first: Record, second: Record) -> Record:
@@ -144,16 +132,6 @@ def _joined(first: Record, second: Record) -> Record:
         for name in ("op", "pv", "sp")
     }
     return dataclasses.replace(second, valves=("V1", "V2"), outputs=("PV1", "PV2"), **columns)
-
-
-def _lagged(stem: FloatArray, lag: float) -> FloatArray:
-    """Return the stem behind a lag, with its mean before it, shape (LEAD + N,)."""
-    share, value = math.exp(-1.0 / lag), 0.0
-    out = np.zeros(LEAD + len(stem))
-    for k, way in enumerate((stem - stem.mean()).tolist(), LEAD):
-        value = share * value + (1.0 - share) * way
-        out[k] = value
-    return out
 
 
 @dataclasses.dataclass(frozen=True)
@@ -306,13 +284,12 @@ def _log(random: np.random.Generator, low: float, high: float) -> float:
 def _noise(random: np.random.Generator, count: int) -> FloatArray:
     white = random.standard_normal(count)
     share = 0.0 if random.random() < 0.5 else random.uniform(0.3, 0.9)
-    return _filtered(white, share)
+    return _filtered(white, share, math.sqrt(1.0 - share**2))
 
 
-def _filtered(white: FloatArray, share: float) -> FloatArray:
-    """Return first-order noise of standard deviation 1."""
-    out = np.empty_like(white)
-    value, scale = 0.0, math.sqrt(1.0 - share**2)
+def _filtered(white: FloatArray, share: float, scale: float) -> FloatArray:
+    """Return values behind a lag: ``share`` of the last one and ``scale`` of the new one."""
+    out, value = np.empty_like(white), 0.0
     for k, shock in enumerate(white.tolist()):
         value = share * value + scale * shock
         out[k] = value
@@ -326,7 +303,8 @@ def _load(random: np.random.Generator, kind: str, count: int, time: float) -> Fl
         walk = np.cumsum(random.standard_normal(count))
         return np.asarray((walk - walk.mean()) / max(np.ptp(walk), 1e-9) * 4.0)
     if kind == "coloured":
-        return _filtered(random.standard_normal(count), math.exp(-1.0 / (3.0 * time)))
+        share = math.exp(-1.0 / (3.0 * time))
+        return _filtered(random.standard_normal(count), share, math.sqrt(1.0 - share**2))
     if kind == "steps":
         jumps = np.where(random.random(count) < 4.0 / count, random.normal(0.0, 2.0, count), 0.0)
         return np.asarray(np.cumsum(jumps))

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -115,14 +116,7 @@ def run(options: argparse.Namespace) -> int:
 def show(rows: "list[Judged]", ablate: bool) -> None:
     """Print how loops are told by trees fitted to others: of all worlds, and of other worlds."""
     from stiction_ros.identification.judgement import definitions
-    from stiction_studies.calibration.fitting import (
-        by_folds,
-        counts,
-        fitted,
-        loss,
-        probabilities,
-        reliability,
-    )
+    from stiction_studies.calibration.fitting import by_folds, counts, fitted, loss, probabilities
 
     console = Console()
     folds = by_folds(rows)
@@ -138,8 +132,11 @@ def show(rows: "list[Judged]", ablate: bool) -> None:
                 table.add_row(key, f"{value:.3f}")
             console.print(table)
     bins = Table("probability", "loops", "with friction")
-    for one in reliability(folds, rows):
-        bins.add_row(f"{one.told:.2f}", str(one.loops), f"{one.true:.2f}")
+    for k in range(10):
+        inside = [(p, row.friction) for p, row in zip(folds, rows, strict=True) if int(10 * p) == k]
+        if inside:
+            told, true = np.mean(inside, axis=0)
+            bins.add_row(f"{told:.2f}", f"{len(inside)}", f"{true:.2f}")
     console.print(bins)
     if ablate:
         table = Table("without", "loss, nats a loop", "more")
