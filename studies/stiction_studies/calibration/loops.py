@@ -5,6 +5,7 @@ import functools
 from collections.abc import Callable, Mapping
 
 from stiction_ros.records.record import Record
+from stiction_studies.calibration.plain_loops import WORLDS as PLAIN_WORLDS
 from stiction_studies.calibration.plain_loops import plain_loop
 
 
@@ -18,8 +19,8 @@ class KnownLoop:
     friction: bool | None
 
 
-def _plain(seed: int, **circumstances: bool) -> KnownLoop:
-    loop = plain_loop(seed, **circumstances)
+def _plain(seed: int, world: str) -> KnownLoop:
+    loop = plain_loop(seed, world=world)
     return KnownLoop(loop.record, loop.friction)
 
 
@@ -34,9 +35,5 @@ def _field(seed: int) -> KnownLoop:
 
 WORLDS: Mapping[str, Callable[[int], KnownLoop]] = {
     "field": _field,
-    "plain": _plain,
-    "quiet": functools.partial(_plain, quiet=True),
-    "cascade": functools.partial(_plain, cascade=True),
-    "waves": functools.partial(_plain, waves=True),
-    "pair": functools.partial(_plain, pair=True),
+    **{world: functools.partial(_plain, world=world) for world in PLAIN_WORLDS},
 }

@@ -18,6 +18,9 @@ LAWS = ("he", "kano", "choudhury", "mechanics", "deadband")
 SENSORS = ("plain", "stale", "wireless", "exception", "rounded")
 LOADS = ("walk", "coloured", "steps", "sine", "square", "triangle", "drifting_cycle")
 MASTERS = ("walk", "coloured", "steps", "sine")
+# but plain: little but the valve moves the loop; a master moves SP, which is not recorded; the load
+# is a large regular wave; the valve of another loop, the first of the record, moves PV as well
+WORLDS = {"plain": 0, "quiet": 1, "cascade": 2, "waves": 4, "pair": 8}
 SUBSTEPS = 40  # of the stem's mechanics in a sample
 HUSH, LITTLE = 0.2, 0.1  # of noise and load on a quiet loop: a valve makes a plain limit cycle
 LEAD = 500  # samples before the record, in which a cycle settles
@@ -47,13 +50,7 @@ class PlainLoop:
 
 
 def plain_loop(
-    seed: int,
-    law: str | None = None,
-    sensor: str | None = None,
-    quiet: bool = False,
-    cascade: bool = False,
-    waves: bool = False,
-    pair: bool = False,
+    seed: int, law: str | None = None, sensor: str | None = None, world: str = "plain"
 ) -> PlainLoop:
     """Return the loop of a seed.
 
@@ -61,13 +58,10 @@ def plain_loop(
         seed: 0 or more.
         law: of the valve, of :data:`LAWS`, ``none`` or ``stuck``; drawn where None.
         sensor: of :data:`SENSORS`; drawn where None.
-        quiet: whether little but the valve moves the loop.
-        cascade: whether a master moves SP and the record has no SP.
-        waves: whether the load is a regular wave, large beside a valve without friction.
-        pair: whether the valve of another loop, the first of the record, moves PV as well.
+        world: of :data:`WORLDS`.
     """
-    world = int(quiet) + 2 * int(cascade) + 4 * int(waves) + 8 * int(pair)
-    random = np.random.default_rng([seed, 4711, world])
+    quiet, cascade, waves, pair = (world == name for name in list(WORLDS)[1:])
+    random = np.random.default_rng([seed, 4711, WORLDS[world]])
     drawn = random.choice(["none", "stuck", *LAWS], p=[0.47, 0.03, 0.14, 0.1, 0.1, 0.1, 0.06])
     law = law or str(drawn)
     kept = str(random.choice(SENSORS, p=[0.5, 0.14, 0.12, 0.12, 0.12]))
@@ -112,7 +106,7 @@ def plain_loop(
     op, stem, pv = (signal[LEAD:] for signal in told)
     span = float(np.subtract(*np.percentile(op, [98.0, 2.0])))
     record = Record(
-        name=f"{ {0: 'plain', 1: 'quiet', 2: 'cascade', 4: 'waves', 8: 'pair'}[world] }{seed:05d}",
+        name=f"{world}{seed:05d}",
         sample_time=1.0,
         valves=("V1",),
         outputs=("PV1",),
@@ -126,12 +120,11 @@ def plain_loop(
     return PlainLoop(record, law, band, 2.0 * static - band, slips, span, stem)
 
 
-def _joined(first: Record, second: Record) -> Record:
-    columns = {
-        name: np.hstack([getattr(first, name), getattr(second, name)])
-        for name in ("op", "pv", "sp")
-    }
-    return dataclasses.replace(second, valves=("V1", "V2"), outputs=("PV1", "PV2"), **columns)
+def _joined(one: Record, two: Record) -> Record:
+    op, pv = np.hstack([one.op, two.op]), np.hstack([one.pv, two.pv])
+    sp = None if one.sp is None or two.sp is None else np.hstack([one.sp, two.sp])
+    valves, outputs = ("V1", "V2"), ("PV1", "PV2")
+    return dataclasses.replace(two, valves=valves, outputs=outputs, op=op, pv=pv, sp=sp)
 
 
 @dataclasses.dataclass(frozen=True)

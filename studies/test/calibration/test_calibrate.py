@@ -28,7 +28,7 @@ def test_a_seed_makes_the_same_record_again(world: str) -> None:
 def test_a_record_begins_in_a_settled_cycle() -> None:
     """A first push would tell which valves stick."""
     for seed in range(20):
-        loop = plain_loop(seed, law="he", sensor="plain", quiet=True)
+        loop = plain_loop(seed, law="he", sensor="plain", world="quiet")
         if loop.friction:
             op = loop.record.op[:, 0]
             assert np.ptp(op[:100]) < 1.5 * np.ptp(op[100:])
