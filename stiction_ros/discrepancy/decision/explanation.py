@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.discrepancy.candidate.base import Candidate
+from stiction_ros.discrepancy.decision.decide import FRICTION
 from stiction_ros.discrepancy.decision.scores import all_candidates
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.likelihood.noise import NoiseFit
-from stiction_ros.discrepancy.measures import TURNS
+from stiction_ros.discrepancy.measures import MARGIN, TURNS
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.loop import LoopModel
@@ -138,6 +138,29 @@ class Explanation:
         """Return the same process with these effects, each fitted again behind the others."""
         return self.holding(refit_together(self.bare, self.runs, effects))
 
+    def extended(self, effects: Sequence[AddedEffect]) -> "Explanation":
+        """Return the same process with effects fitted together, the last of them a new one.
+
+        What the others explain no longer goes.
+        """
+        *others, new = refit_together(self.bare, self.runs, effects)
+        return self.holding([*(each for each in others if each.fit.delta_bic >= MARGIN), new])
+
+    def tells(self, fit: CandidateFit) -> bool:
+        """Tell whether a fit is one more friction or curve of a valve that has one already.
+
+        Laws tell one thing in several ways: the second one mends the figures of the first.
+        """
+        new = fit.candidate
+        return any(
+            each.place == new.place
+            and (
+                (new.curved and each.fit.candidate.curved)
+                or each.fit.candidate.about.family == FRICTION == new.about.family
+            )
+            for each in self.effects
+        )
+
     def others(self, k: int) -> tuple[AddedEffect, ...]:
         """Return all effects but one."""
         return (*self.effects[:k], *self.effects[k + 1 :])
@@ -232,14 +255,10 @@ def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> A
     others = effects[:k] + effects[k + 1 :]
     base = left_open(run_with(bare, runs, others), others)
     own = effects[k].fit.candidate
-    found = _same_candidate(all_candidates(base), own)
+    found = next((each for each in all_candidates(base) if each.name == own.name), None)
     if found is None:
         return effects[k]
     candidate = dataclasses.replace(found, twins=own.twins)
     point = effects[k].fit.point
     fit = fit_candidate(base, base.run.gap, candidate, point if len(point) else None)
     return dataclasses.replace(effects[k], fit=fit)
-
-
-def _same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candidate | None:
-    return next((each for each in candidates if each.identity == wanted.identity), None)

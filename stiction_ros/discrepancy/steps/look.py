@@ -10,6 +10,7 @@ from stiction_ros.discrepancy.candidate.valve import departures
 from stiction_ros.discrepancy.decision.decide import (
     Decision,
     GapVerdict,
+    borne_out,
     confirmed_by_stem,
     decide,
     not_contradicted,
@@ -20,12 +21,6 @@ from stiction_ros.discrepancy.decision.explanation import (
     Explanation,
     left_open,
     refit_together,
-)
-from stiction_ros.discrepancy.decision.extend import (
-    extend,
-    held_rows_bear_out,
-    moved_away,
-    told_already,
 )
 from stiction_ros.discrepancy.decision.scores import (
     Scores,
@@ -41,13 +36,9 @@ from stiction_ros.discrepancy.process.change import open_figures, refitted_proce
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import changed_again, process_first
 
-SCORED = 0.8  # of the time of a look
-MOVED_AWAY = "the free run of the held-out rows moves away from PV"
-"""Why an effect is taken back that the looks had kept."""
-
 
 def look_on(task: Task, state: State) -> State:
-    """Look until nothing more is found; what takes the free run away from PV is taken back.
+    """Look until nothing more is found.
 
     An effect that is in doubt with others is added for a while: its rivals may be near only beside
     what is not yet in the model. So is one that gains most and that the held-out rows refuse: what
@@ -62,8 +53,6 @@ def look_on(task: Task, state: State) -> State:
     if not explained(state):
         assert state.doubted is not None
         state = state.doubted
-    while state.now.effects and state.earlier and moved_away(state.before, state.now.base):
-        state = withdrawn(state)
     return state
 
 
@@ -84,11 +73,8 @@ def look(task: Task, state: State, k: int) -> State:
     given_up = dataclasses.replace(own, kept=False, reason=decision.reason)
     refused = dataclasses.replace(seen, looks=(*state.looks, given_up))
     doubted = state.doubted or (None if decision.inseparable else refused)
-    same = grown.changes is state.now.changes  # elsewhere the process was changed beside it
-    earlier = (*state.earlier, state.now.bare) if same else (grown.bare,)
-    seen = dataclasses.replace(seen, now=grown, earlier=earlier, doubted=doubted)
-    again = changed_again(task, seen, grown.effects)
-    return seen if again is None else seen.behind(again)
+    again = changed_again(task, dataclasses.replace(seen, now=grown), grown.effects)
+    return dataclasses.replace(seen, now=again or grown, doubted=doubted)
 
 
 def explained(state: State) -> bool:
@@ -108,22 +94,9 @@ def explained(state: State) -> bool:
         rivals = [fit.evidence for fit in refused.scores.fits if not fit.candidate.inside]
         if gained < max(rivals, default=0.0):
             return False
-        if not held_rows_bear_out(before, base, dated=False):
+        if not _borne_out(before, base, dated=False):
             return False
     return gained > max(base.score_under_declared - base.score, 0.0)
-
-
-def withdrawn(state: State) -> State:
-    """Take the last effect back: with it the free run is farther from PV than before."""
-    last = max(k for k, each in enumerate(state.looks) if each.kept)
-    ended = dataclasses.replace(state.looks[last], kept=False, reason=MOVED_AWAY)
-    before = dataclasses.replace(state.now, bare=state.earlier[-1])
-    return dataclasses.replace(
-        state,
-        now=before.holding(state.now.effects[:-1]),
-        earlier=state.earlier[:-1],
-        looks=(*state.looks[:last], ended, *state.looks[last + 1 :]),
-    )
 
 
 def scored_by(task: Task, state: State, k: int) -> Scores:
@@ -142,7 +115,7 @@ def scored_by(task: Task, state: State, k: int) -> Scores:
         candidates = tuple(each for each in candidates if not each.absorbed)
 
     def report(done: float) -> None:
-        task.report((k + SCORED * done) * share)
+        task.report((k + done) * share)
 
     beside = left_open(now.base.run, now.effects, now.slopes) if now.slopes else None
     return score_candidates(base, candidates, report, beside=beside)
@@ -157,7 +130,7 @@ def decided(task: Task, state: State, scores: Scores) -> Decision:
     base = scores.base
     measured = max(1.0 - max(task.runs.thinned), ROUNDING)
     possible = not_contradicted(base.run, scores.fits)
-    allowed = [fit for fit in possible if not told_already(state.now.effects, fit)]
+    allowed = [fit for fit in possible if not state.now.tells(fit)]
 
     def rests(fit: CandidateFit) -> int:
         return departures(base.run, fit.candidate, fit.point)
@@ -187,7 +160,16 @@ def _extended(task: Task, state: State, decision: Decision) -> tuple[Explanation
         bare = refitted_process(process.bare, task.runs, effects)
         process = dataclasses.replace(process, bare=bare)
         effects = refit_together(bare, task.runs, effects)
-    return extend(process, effects, now.base, lent=lent)
+    grown = process.extended(effects)
+    dated = grown.effects[-1].fit.candidate.dated
+    if lent or _borne_out(now.base, grown.base, dated=dated):
+        return grown, ""
+    return None, "the innovations of the held-out rows do not become smaller"
+
+
+def _borne_out(before: Baseline, after: Baseline, *, dated: bool) -> bool:
+    """Tell whether the held-out rows bear out what lies between two models."""
+    return borne_out(before.bic - after.bic, after.held_gain(before), dated)
 
 
 def _in_doubt_of_place(base: Baseline, decision: Decision) -> Decision:

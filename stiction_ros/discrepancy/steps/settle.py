@@ -12,7 +12,6 @@ from stiction_ros.discrepancy.decision.decide import (
     not_contradicted,
 )
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
-from stiction_ros.discrepancy.decision.extend import told_already
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.steps.look import look_on, scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
@@ -156,7 +155,7 @@ def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]
         and f.evidence > max(mine - NEAR, 0.0)
         and confirmed(f)
         and large_enough(f)
-        and not told_already(others.now.effects, f)
+        and not others.now.tells(f)
         and not (own.about.family == f.candidate.about.family == FRICTION)
     ]
     return twins, alike[:RIVALS]

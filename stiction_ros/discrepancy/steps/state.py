@@ -38,8 +38,6 @@ class State:
     given: LoopModel  # the model without any effect that was added, its process as it was given
     before: Baseline  # of the free run without what was added
     now: Explanation  # what is in the model
-    # ``now.bare`` before each of its effects came, as long as they may be taken back
-    earlier: tuple[LoopModel, ...] = ()
     looks: tuple[Look, ...] = ()  # the rounds so far
     opened: int = 0  # the first look at the process as it is now
     testable: tuple[Testable, ...] = ()  # what the last look could have seen
@@ -49,7 +47,3 @@ class State:
     def holding(self, effects: Sequence[AddedEffect]) -> "State":
         """Return the same process with these effects in place of its own."""
         return dataclasses.replace(self, now=self.now.holding(effects))
-
-    def behind(self, found: Explanation) -> "State":
-        """Return the state with another process, and the effects behind it."""
-        return dataclasses.replace(self, now=found, earlier=())

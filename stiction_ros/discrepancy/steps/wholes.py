@@ -153,8 +153,8 @@ def mended(task: Task, state: State) -> State | None:
     if same_thing(found.changes, names):
         return None
     # Where no effect was in the model, the looks have to find it.
-    other = state.behind(found if added else found.holding(()))
-    return dataclasses.replace(other, opened=len(state.looks))
+    other = found if added else found.holding(())
+    return dataclasses.replace(state, now=other, opened=len(state.looks))
 
 
 def process_first(task: Task, state: State, scores: Scores) -> State | None:
@@ -182,7 +182,7 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
     rivals = [fit.candidate.effect for fit in inside if fit.evidence > explained - margin]
     if best is not None and same_thing(found.changes, [best.candidate.effect, *rivals]):
         return None
-    return state.behind(found)
+    return dataclasses.replace(state, now=found)
 
 
 def changed_again(task: Task, state: State, effects: Sequence[AddedEffect]) -> Explanation | None:
