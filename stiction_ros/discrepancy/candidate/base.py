@@ -3,7 +3,7 @@
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 
@@ -46,17 +46,9 @@ class Response:
         )
 
 
-class Identity(NamedTuple):
-    """Which change of a model a candidate is, whatever its figures and the model behind it."""
-
-    place: str  # place, effect: as loop models name them
-    effect: str
-    law: str | None  # where the effect has several; None elsewhere
-
-
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class Candidate(ABC):
-    """One change of the current model; the same one beside another model has its ``identity``."""
+    """One change of the current model; the same one beside another model has its ``name``."""
 
     place: str  # place, effect: as loop models name them, such as ``valve:V1`` and ``stiction``
     effect: str
@@ -67,6 +59,8 @@ class Candidate(ABC):
     # whether it belongs to the catalogue; others show only that something is amiss
     inside: bool = True
     dated: bool = False  # whether its first axis is a moment of the record
+    # at which PV surprises most, s: further values of such an axis in the first grid
+    moments: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(0))
     # places and effects of the catalogue that are parts of it
     contains: tuple[tuple[str, str], ...] = ()
     # share of what it gains that such a part has to gain to be looked at first
@@ -77,8 +71,18 @@ class Candidate(ABC):
     sharp: bool = False
 
     @abstractmethod
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
+        """Return the response for points of shape (G, axes), values that the effect can have."""
+
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
-        """Return the response for points of shape (G, axes), in values."""
+        """Return the response for points of shape (G, axes), values; others are marked as such."""
+        possible = self.possible(points)
+        if possible.all():
+            return self.answer(run, points)
+        if not possible.any():
+            return Response({0: np.zeros((len(run.runs), len(points)))}, possible=possible)
+        able = np.where(possible[:, None], points, points[np.argmax(possible)])
+        return dataclasses.replace(self.answer(run, able), possible=possible)
 
     @abstractmethod
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour | None:
@@ -92,7 +96,10 @@ class Candidate(ABC):
         """Return the first grid in coordinates of the search, shape (G, axes)."""
         if not self.axes:
             return np.zeros((1, 0))
-        meshed = np.meshgrid(*[axis.grid() for axis in self.axes], indexing="ij")
+        values, first = [axis.grid() for axis in self.axes], self.axes[0]
+        if self.dated:
+            values[0] = np.union1d(values[0], np.clip(self.moments, first.low, first.high))
+        meshed = np.meshgrid(*values, indexing="ij")
         return np.stack([each.ravel() for each in meshed], axis=1)
 
     def values(self, coordinates: FloatArray) -> FloatArray:
@@ -190,11 +197,6 @@ class Candidate(ABC):
         return None
 
     @property
-    def identity(self) -> Identity:
-        """Which change it is."""
-        return Identity(self.place, self.effect, self.law)
-
-    @property
     def key(self) -> tuple[str, str]:
         """Place and effect."""
         return self.place, self.effect
@@ -219,6 +221,26 @@ class Candidate(ABC):
         return None
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class KindCandidate(Candidate):
+    """A candidate whose figures are those of one behaviour, in their order."""
+
+    kind: type[Behaviour]  # the behaviour
+
+    @property
+    def law(self) -> str | None:
+        return self.kind.law
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        """Return the behaviour's parameters, shape (G, parameters), for points of the grid."""
+        return points
+
+    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
+        keys = [entry.key for entry in self.kind.parameters()]
+        row = self.rows(point[None, :])[0].tolist()
+        return self.kind.from_mapping(dict(zip(keys, row, strict=False)))
+
+
 def figures_of(behaviour: Behaviour) -> dict[str, float]:
     """Return the parameters of an effect by key, in engineering units."""
     return {p.key: float(getattr(behaviour, p.attribute)) for p in behaviour.parameters()}
@@ -230,45 +252,38 @@ def spans_of(figures: Sequence[Mapping[str, float]]) -> dict[str, tuple[float, f
 
 
 LEAST_LAG = 2.5  # times the shortest lag that is searched, a fifth of a sample
-
-
-def lasts(candidate: Candidate, point: FloatArray) -> bool:
-    """Tell whether a lag is longer than half a sample.
-
-    Between samples a signal moves on: less than one of them may be the sampling's own.
-    """
-    return float(point[0]) >= LEAST_LAG * candidate.axes[0].low
-
-
 QUARTER = 0.25
 """Of a sample: the mean of the stem over a sample lies between its end and its middle."""
 
 
-def late_axes(asked: bool) -> tuple[Axis, ...]:
-    """Return the axis of how late within a sample a lag moves on; none where that is not asked."""
-    return (Axis(-QUARTER, QUARTER, 1, linear=True),) if asked else ()
+class Lagging(Candidate):
+    """A lag by its time constant, where it begins, and how late within a sample it moves on."""
 
+    def count(self, point: FloatArray) -> int:
+        """Return how many figures count: not where it begins, but how late it moves."""
+        return max(len(point) - 1, 1)
 
-def later(values: FloatArray, late: FloatArray, run: FreeRun) -> FloatArray:
-    """Return signals that come late by a share of a sample.
+    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
+        """Tell whether it is longer than half a sample.
 
-    Args:
-        values: shape (N, G).
-        late: samples beyond a quarter, shape (G, 1); shape (G, 0) where that is not asked.
-        run: whose records they are of.
-    """
-    for share in late.T:
-        for rows in run.runs.slices:
-            values[rows][1:] -= (QUARTER + share) * np.diff(values[rows], axis=0)
-    return values
+        Between samples a signal moves on: less than one of them may be the sampling's own.
+        """
+        return float(point[0]) >= LEAST_LAG * self.axes[0].low
 
-
-def figures_of_lag(point: FloatArray) -> int:
-    """Return how many figures a lag has that count: not where it begins, but how late it moves."""
-    return max(len(point) - 1, 1)
+    def late(self, values: FloatArray, points: FloatArray, run: FreeRun) -> FloatArray:
+        """Return signals, shape (N, G), as late within a sample as the points say, if they do."""
+        for share in points[:, 2:].T:
+            for rows in run.runs.slices:
+                values[rows][1:] -= (QUARTER + share) * np.diff(values[rows], axis=0)
+        return values
 
 
 def lag_axis(run: FreeRun) -> Axis:
     """Return the range of time constants that a record tells."""
     step = run.runs.sample_time
     return Axis(0.2 * step, max(len(run.runs) / 8.0, 2.0) * step, 20, logarithmic=True)
+
+
+def late_axes(asked: bool) -> tuple[Axis, ...]:
+    """Return the axis of how late within a sample a lag moves on; none where that is not asked."""
+    return (Axis(-QUARTER, QUARTER, 1, linear=True),) if asked else ()

@@ -9,12 +9,11 @@ import numpy as np
 from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.candidate.base import (
     Candidate,
+    KindCandidate,
+    Lagging,
     Response,
-    figures_of_lag,
     lag_axis,
-    lasts,
     late_axes,
-    later,
 )
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end
 from stiction_ros.effects import (
@@ -48,10 +47,8 @@ class OutputCandidate(Candidate):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class FilterCandidate(OutputCandidate):
-    """A linear change between process and sensor: pole, delay, leak."""
-
-    kind: type[Behaviour]  # the behaviour; its first figure is searched
+class FilterCandidate(KindCandidate, OutputCandidate):
+    """A linear change between process and sensor, by its first figure: pole, delay, leak."""
 
     @classmethod
     def of(cls, run: FreeRun, output: int, kind: type[Behaviour], axes: tuple[Axis, ...]) -> Self:
@@ -63,13 +60,13 @@ class FilterCandidate(OutputCandidate):
     def smooth(self) -> bool:
         return True
 
-    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
         parts = []
         for rows in run.runs.slices:
             values = run.forced[rows, self.output]
             step = run.runs.sample_time
             start = self.starts(points, float(values[0]))
-            parts.append(self.kind.simulate_grid(points[:, :1], values, start, step))
+            parts.append(self.kind.simulate_grid(self.rows(points), values, start, step))
         response = self.late(end_to_end(parts), points, run)
         response -= run.forced[:, self.output, None]
         return Response({self.output: response})
@@ -82,24 +79,15 @@ class FilterCandidate(OutputCandidate):
         """Return the outputs of the filters, shape (N, G), as late as they come."""
         return values
 
-    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
-        return self.kind.from_mapping({self.kind.parameters()[0].key: float(point[0])})
+    def rows(self, points: FloatArray) -> FloatArray:
+        return points[:, :1]
 
 
-class PoleCandidate(FilterCandidate):
-    """One more lag of the output, by its time constant, where it begins and how late it moves."""
-
-    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
-        return lasts(self, point)
+class PoleCandidate(Lagging, FilterCandidate):
+    """One more lag of the output."""
 
     def starts(self, points: FloatArray, first: float) -> FloatArray:
         return first + points[:, 1]
-
-    def late(self, values: FloatArray, points: FloatArray, run: FreeRun) -> FloatArray:
-        return later(values, points[:, 2:], run)
-
-    def count(self, point: FloatArray) -> int:
-        return figures_of_lag(point)
 
     def keeps(self, run: FreeRun, point: FloatArray) -> float | None:
         return math.exp(-run.runs.sample_time / max(float(point[0]), 1e-9))
@@ -111,7 +99,7 @@ class GainCandidate(OutputCandidate):
 
     factors: int = 1
 
-    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
         return Response({}, {self.output: run.forced[:, self.output][:, None, None]})
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
@@ -176,7 +164,7 @@ class GainChange(_Decoy):
     factors: int = 2
     dated: bool = True
 
-    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
         late = (run.runs.time[:, None] >= points[:, 0]).astype(float)
         free = run.forced[:, self.output, None] - run.forced[:, self.output].mean()
         return Response({}, {self.output: np.stack([late * free, late], axis=2)})
@@ -189,7 +177,7 @@ class Trend(_Decoy):
     effect: str = "slow load"
     factors: int = KNOTS
 
-    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
         from scipy.interpolate import BSpline
 
         at = run.runs.time / max(float(run.runs.time.max()), 1e-9)
@@ -210,7 +198,7 @@ class Dynamics(_Decoy):
     def absorbed(self) -> bool:
         return True
 
-    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
         parts = []
         for rows in run.runs.slices:
             values = run.forced[rows, self.output]

@@ -8,12 +8,11 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import (
     Candidate,
+    KindCandidate,
+    Lagging,
     Response,
-    figures_of_lag,
     lag_axis,
-    lasts,
     late_axes,
-    later,
 )
 from stiction_ros.discrepancy.measures import ROUNDING
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
@@ -44,7 +43,7 @@ LEAST_JUMP = 0.05  # of the band: less may be what the stem moves between two sa
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class ValveCandidate(Candidate):
+class ValveCandidate(KindCandidate):
     """A behaviour at the end of a valve's chain.
 
     Its stems start at rest at the first OP; stiction, backlash, a lag and a slew have one more
@@ -52,7 +51,6 @@ class ValveCandidate(Candidate):
     """
 
     valve: int  # its index
-    kind: type[Behaviour]  # the behaviour
 
     @classmethod
     def at(
@@ -62,20 +60,12 @@ class ValveCandidate(Candidate):
         place = f"valve:{run.model.valves[valve].name}"
         return cls(place=place, effect=kind.effect, axes=axes, valve=valve, kind=kind, **more)
 
-    @property
-    def law(self) -> str | None:
-        return self.kind.law
-
     def signal(self, run: FreeRun) -> FloatArray:
         return run.stems[:, self.valve]
 
     @property
     def smooth(self) -> bool:
         return self.curved or self.kind in (Slew, Lag)
-
-    def rows(self, points: FloatArray) -> FloatArray:
-        """Return the behaviour's parameters, shape (G, parameters), for points of the grid."""
-        return points
 
     def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
         """Return stem positions, shape (N, G), %.
@@ -105,7 +95,7 @@ class ValveCandidate(Candidate):
         """Return where the stems stand before the first sample, shape (G,), %."""
         return np.array([first + self.lead(point) for point in points])
 
-    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
         stems = self.stems(run, points)
         shifts, least = {}, ROUNDING * max(float(np.ptp(run.forced)), 1e-9)
         for i in range(run.forced.shape[1]):
@@ -115,16 +105,7 @@ class ValveCandidate(Candidate):
             shift -= run.forced[:, i : i + 1]
             if max(float(shift.max()), -float(shift.min())) > least:
                 shifts[i] = shift
-        possible = self.possible(points)
-        return Response(
-            shifts or {0: np.zeros((len(stems), len(points)))},
-            possible=None if possible.all() else possible,
-        )
-
-    def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
-        row = self.rows(point[None, :])[0]
-        values = dict(zip((p.key for p in self.kind.parameters()), row.tolist(), strict=False))
-        return self.kind.from_mapping(values)
+        return Response(shifts or {0: np.zeros(stems.shape)})
 
 
 class StictionCandidate(ValveCandidate):
@@ -199,18 +180,12 @@ class BacklashCandidate(OneFigure):
         return 0.5 * AT_REST * float(point[0] * point[1])
 
 
-class LagCandidate(OneFigure):
-    """A lag by its time constant, the place of the stem at the start, and how late it moves."""
-
-    def count(self, point: FloatArray) -> int:
-        return figures_of_lag(point)
-
-    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
-        return lasts(self, point)
+class LagCandidate(Lagging, OneFigure):
+    """A lag of the stem."""
 
     def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
         stems = super().stems(run, points, from_measured=from_measured)
-        return later(stems, points[:, 2:], run)
+        return self.late(stems, points, run)
 
     def lead(self, point: FloatArray) -> float:
         return float(point[1])

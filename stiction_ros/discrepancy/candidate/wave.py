@@ -10,7 +10,7 @@ import numpy as np
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
-from stiction_ros.discrepancy.simulation.free_run import SMALL, FreeRun
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import (
     Axis,
     Behaviour,
@@ -80,26 +80,21 @@ class WaveCandidate(Candidate):
         """Return what of the waves enters a process, as :meth:`columns` returns them."""
         return self.columns(run, points)
 
-    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
         if self.place.startswith(DISTURBANCE):
             return Response({}, {self.index: self.columns(run, points)})
         waves = self.entering(run, points)
-        count, size, factors = waves.shape
-        entering = run.stems[:, self.index, None] + SMALL * waves.reshape(count, -1)
-        sizes = {}
-        for i in range(run.forced.shape[1]):
-            if run.responses.reaches(i, self.index):
-                moved = run.drive(i, self.index, entering)
-                moved -= run.forced[:, i : i + 1]
-                sizes[i] = (moved / SMALL).reshape(count, size, factors)
-        return Response({}, sizes)
+        flat = waves.reshape(len(waves), -1)
+        reached = [i for i in range(run.forced.shape[1]) if run.responses.reaches(i, self.index)]
+        return Response(
+            {}, {i: run.slope(i, self.index, flat).reshape(waves.shape) for i in reached}
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class StepCandidate(WaveCandidate):
     """A step at one moment."""
 
-    moments: FloatArray  # at which PV surprises most, s
     dated: bool = True
     sharp: bool = True
 
@@ -109,11 +104,6 @@ class StepCandidate(WaveCandidate):
         last = float(run.runs.time.max())
         axes = (Axis(0.02 * last, 0.98 * last, 60, natural=True),)
         return cls.at(run, kind, index, StepDisturbance.effect, axes=axes, moments=moments)
-
-    def grid(self) -> FloatArray:
-        axis = self.axes[0]
-        moments = np.clip(self.moments, axis.low, axis.high)
-        return np.unique(np.concatenate([axis.grid(), moments]))[:, None]
 
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
         late = run.runs.time[:, None] >= points[:, 0] - 1e-9

@@ -88,6 +88,19 @@ class Runs:
         return slice(self.scanned * rows.start, self.scanned * rows.stop)
 
     @property
+    def stems_recorded(self) -> bool:
+        """Whether every record has the positions of its stems."""
+        return all(record.stem is not None for record in self.records)
+
+    def stem(self, valve: str) -> FloatArray:
+        """Return the recorded positions of a stem, shape (N,), %; NaN in records without."""
+        parts = [
+            np.full(len(r), np.nan) if r.stem is None else r.stem[:, r.valves.index(valve)]
+            for r in self.records
+        ]
+        return np.concatenate(parts)
+
+    @property
     def sample_time(self) -> float:
         """Seconds between two samples."""
         return self.records[0].sample_time
@@ -277,7 +290,7 @@ class FreeRun:
         moves = np.zeros((len(self.runs), 1))
         for rows in self.runs.slices:
             moves[rows][1:, 0] = np.diff(self.stems[rows, valve])
-        return self._answer(output, valve, moves)
+        return self.slope(output, valve, moves)
 
     def _within(self, output: int, valve: int) -> FloatArray:
         """Return the answers to what the first scan of a sample is above the second, shape (N, 2).
@@ -289,9 +302,9 @@ class FreeRun:
         for rows in self.runs.slices:
             above[rows, 0] = first[rows] - second[rows]
             above[rows][1:, 1] = above[rows][:-1, 0]
-        return self._answer(output, valve, above)
+        return self.slope(output, valve, above)
 
-    def _answer(self, output: int, valve: int, moves: FloatArray) -> FloatArray:
+    def slope(self, output: int, valve: int, moves: FloatArray) -> FloatArray:
         """Return what small moves of a stem, shape (N, G), %, do to an output, per %."""
         moved = self.drive(output, valve, self.stems[:, valve, None] + SMALL * moves)
         return np.asarray((moved - self.forced[:, output, None]) / SMALL)

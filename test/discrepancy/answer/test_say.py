@@ -16,7 +16,7 @@ from stiction_ros.effects import Behaviour, FloatArray
 class Named(Candidate):
     """A candidate that is only a name."""
 
-    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
         raise NotImplementedError
 
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour | None:

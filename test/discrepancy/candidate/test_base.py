@@ -59,6 +59,6 @@ def test_candidates_are_values_with_an_identity() -> None:
     beside = RUN.model.with_effect("valve:V1", Slew(2.0))
     run = FreeRun(beside, RUN.runs)
     now, then = all_candidates(Baseline.of(RUN)), all_candidates(Baseline.of(run))
-    names = [each.identity for each in now]
+    names = [each.name for each in now]
     assert len(set(names)) == len(names)
-    assert {each.identity for each in then} == set(names)
+    assert {each.name for each in then} == set(names)

@@ -22,7 +22,7 @@ MARGIN = 10.0
 class Named(Candidate):
     """A candidate that is only a name."""
 
-    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
         raise NotImplementedError
 
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour | None:
