@@ -24,19 +24,35 @@ def held(num: ArrayLike, den: ArrayLike, dead_time: float, sample_time: float) -
     if len(above) > n:
         said = f"num has {len(above)} coefficients, den {len(below)}"
         raise InputError(f"PV answers at once: {said}", fix="give more in den than in num")
-    a, b = np.eye(n, k=-1), np.eye(n, 1)
-    a[0] = -below[1:] / below[0]
     whole = math.floor(dead_time / sample_time + WHOLE)
     part = max(dead_time - whole * sample_time, 0.0)
+    states, poles = pulses(below, part, sample_time)
+    pulse = np.pad(above, (n - len(above), 0)) / below[0] @ states
+    taps = np.convolve(pulse, poles)[: n + 1]
+    return taps if part > WHOLE * sample_time else taps[:n], poles, whole
+
+
+def pulses(den: FloatArray, part: float, sample_time: float) -> tuple[FloatArray, FloatArray]:
+    """Return what a stem does that is held at 1 for one sample, and the poles as a polynomial.
+
+    Args:
+        den: of s, the highest power first, shape (n + 1,).
+        part: of the dead time beyond whole samples, s.
+        sample_time: s.
+
+    Returns:
+        The answers of s^(n−1) / den, …, 1 / den by den's first figure, from the first sample on,
+        shape (n, n + 1), and 1, a₁, … of the equation.
+    """
+    n = len(den) - 1
+    a, b = np.eye(n, k=-1), np.eye(n, 1)
+    a[0] = -den[1:] / den[0]
     late, late_in = transition(a, b, part)
     early, early_in = transition(a, b, sample_time - part)
     states = [early_in, early @ (late_in + late @ early_in)]
     while len(states) <= n:
         states.append(early @ late @ states[-1])
-    poles = np.asarray(np.poly(early @ late), dtype=np.float64)
-    pulse = np.pad(above, (n - len(above), 0)) / below[0] @ np.hstack(states)
-    taps = np.convolve(pulse, poles)[: n + 1]
-    return taps if part > WHOLE * sample_time else taps[:n], poles, whole
+    return np.hstack(states), np.asarray(np.poly(early @ late), dtype=np.float64)
 
 
 def transition(a: FloatArray, b: FloatArray, time: float) -> tuple[FloatArray, FloatArray]:

@@ -16,12 +16,7 @@ from stiction_ros.discrepancy.decision.explanation import (
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.least_squares import left_by
 from stiction_ros.discrepancy.measures import GAUSS_NEWTON, MARGIN, NORMAL, ROUNDING
-from stiction_ros.discrepancy.process.equations import (
-    Equation,
-    equations_of,
-    process_with,
-    with_equations,
-)
+from stiction_ros.discrepancy.process.equations import equation_of, process_with, with_equation
 from stiction_ros.discrepancy.process.slower import GAIN, Changeable
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
@@ -118,7 +113,7 @@ class _Search:
         self.model, self.runs, self.effects, self.output = model, runs, effects, output
         self.declared = declared
         self.smooth = [k for k, each in enumerate(effects) if each.fit.candidate.smooth]
-        self.equation = Changeable(equations_of(model)[output])
+        self.equation = Changeable(equation_of(model, output))
         self.figures = self.equation.figures
         self.least = np.array([each.least for each in self.figures])
         self.most = np.array([each.most for each in self.figures])
@@ -231,8 +226,9 @@ class _Search:
         moved = []
         for k, each in enumerate(np.eye(len(self.free))):
             if self.free[k]:
-                equations = self._equations(self.values + self.probes * each)
-                other = process_with(run.model.process, equations, run.model.sample_time)
+                equation = self.equation.changed(self.values + self.probes * each)
+                process, step = run.model.process, run.model.sample_time
+                other = process_with(process, self.output, equation, step)
                 moved.append((run.gap_behind(other, self.output) - gap) / self.probes[k])
         return np.column_stack(moved)
 
@@ -254,12 +250,7 @@ class _Search:
 
     def changed(self, values: FloatArray) -> LoopModel:
         """Return the model with other figures of this output, shape (figures,)."""
-        return with_equations(self.model, self._equations(values))
-
-    def _equations(self, values: FloatArray) -> list[Equation]:
-        equations = equations_of(self.model)
-        equations[self.output] = self.equation.changed(values)
-        return equations
+        return with_equation(self.model, self.output, self.equation.changed(values))
 
     def changes(self, name: str) -> list[ProcessChange]:
         """Return the figures that are another, by the tag of the output."""

@@ -5,11 +5,11 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from stiction_ros.discrepancy.measures import ROUNDING
 from stiction_ros.discrepancy.process.equations import Equation
 from stiction_ros.effects import FloatArray
+from stiction_ros.processes.sampled import pulses
 
 FRACTIONS = 41  # of a sample, at which the dead time's is looked for
 EXACT = 1e-6  # of b, that the continuous plant may miss
@@ -81,23 +81,9 @@ def _solved(poles: ComplexArray, fraction: float, wanted: FloatArray) -> tuple[F
 
 def _answers(poles: ComplexArray, fraction: float) -> FloatArray:
     """Return b for numerators 1, s, s², …, shape (n + 1, n)."""
-    count = len(poles)
-    system = np.zeros((count + 1, count + 1))  # with the held stem as its last state
-    system[:-2, 1:-1] = np.eye(count - 1)
-    system[-2, :-1] = -np.real(np.poly(poles))[:0:-1]
-    system[-2, -1] = 1.0
-    late, early = expm(system * (1.0 - fraction)), expm(system * fraction)
-    a_late, on_late = late[:-1, :-1], late[:-1, -1]
-    a_early, on_early = early[:-1, :-1], early[:-1, -1]
-    whole = a_late @ a_early
-    states = [on_late, whole @ on_late + a_late @ on_early]
-    while len(states) < count + 1:
-        states.append(whole @ states[-1])
-    pulse = np.array([np.zeros(count), *states])  # the states are y, its slope, …
-    denominator = np.real(np.poly(np.exp(poles)))
-    return np.column_stack(
-        [np.convolve(denominator, pulse[:, i])[1 : count + 2] for i in range(count)]
-    )
+    states, denominator = pulses(np.real(np.poly(poles)), fraction, 1.0)
+    answers = [np.convolve(denominator, pulse)[: len(pulse)] for pulse in states[::-1]]
+    return np.column_stack(answers)
 
 
 def later(plant: Held, samples: float) -> tuple[Held, int]:
@@ -141,7 +127,6 @@ MOST = dict.fromkeys((GAIN, TIME_CONSTANT, LEAD), 3.0) | {DELAY: 10.0}
 """Shares and samples that a figure may be larger; beyond that it is another plant."""
 GONE = 0.01  # sample, of a time constant that is none
 PROBES = {GAIN: 0.01, TIME_CONSTANT: 0.01, LEAD: 0.01, DELAY: 0.1}  # of the derivatives
-SHORTEST = 1.0  # sample, of a time constant that counts
 
 
 @dataclasses.dataclass(frozen=True)
@@ -252,7 +237,7 @@ def _of_roots(roots: ComplexArray, what: str, valve: int | None) -> list[Figure]
     for k, root in enumerate(roots.tolist()):
         pace = abs(root)
         swings = abs(root.imag)
-        if root.imag < -ROUNDING or not ROUNDING < pace <= 1.0 / SHORTEST:
+        if root.imag < -ROUNDING or not ROUNDING < pace <= 1.0:
             continue  # one of a pair stands for both
         pair: tuple[int, ...] = (k,)
         if swings > ROUNDING:
