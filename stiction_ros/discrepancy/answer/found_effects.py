@@ -12,17 +12,11 @@ from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.uncertainty import Intervals
-from stiction_ros.discrepancy.gap.measure import (
-    closed_share,
-    gap_in_one_step,
-    levelled,
-    measure_gap,
-)
-from stiction_ros.discrepancy.gap.noise_effects import NoiseEffect, named_laws
+from stiction_ros.discrepancy.gap.measure import Shrunk, gone_share, levelled, rms
+from stiction_ros.discrepancy.gap.noise_effects import NoiseEffect
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.effects import Backlash, Behaviour, FloatArray, HeStiction
-
-NO_MEMORY = np.zeros(0)
+from stiction_ros.signals.autoregression import whiten
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,7 +95,7 @@ def of_noise(laws: Sequence[NoiseEffect], declared: float, margin: float) -> Fou
         declared: score of the declared noise alone.
         margin: within which laws are not told apart.
     """
-    best, *others = named_laws(laws, margin)
+    best, *others = (each for each in laws if each.score < laws[0].score + margin)
     return FoundEffect(
         best.place,
         best.behaviour,
@@ -131,17 +125,20 @@ def own_closed(without: Baseline, base: Baseline, *, dated: bool, given: bool) -
         dated: whether it comes at one moment.
         given: whether the process is the one that was given, and none that was fitted.
     """
-    weights = [
-        fit.ar if (forms or given) and not fit.enlarged else NO_MEMORY
-        for fit, forms in zip(base.noise, base.declared, strict=True)
-    ]
-    closed = closed_share(*(measure_gap(each, weights, dated) for each in (without, base)))
-    floors = [
-        noise.std if noise is not None and fit.enlarged else math.nan
-        for fit, noise in zip(base.noise, declared_noise(base.run.model), strict=True)
-    ]
-    quick = closed_share(*(gap_in_one_step(each, floors, dated) for each in (without, base)))
-    return max(closed, quick)
+    closed, quick = [], []
+    for i, noise in enumerate(declared_noise(base.run.model)):
+        old, new, blocks = without.noise[i], base.noise[i], base.blocks[i]
+        before, after, rows = old.residual, new.residual, blocks.held
+        floor = min(new.stationary_std, rms(after[blocks.train]))
+        every = blocks.scored if dated else rows
+        if (base.declared[i] or given) and not new.enlarged and len(new.ar):
+            before, after = (whiten(each, new.ar) for each in (before, after))
+            rows, floor = every, math.inf
+        closed.append(Shrunk(rms(before[rows]), rms(after[rows]), floor, new.innovation_std))
+        if noise is not None and new.enlarged:
+            left, less = (rms(each.innovations[every]) for each in (old, new))
+            quick.append(Shrunk(left, less, noise.std, noise.std))
+    return max(gone_share(closed), gone_share(quick))
 
 
 def moved_by(without: Baseline, base: Baseline) -> FloatArray:

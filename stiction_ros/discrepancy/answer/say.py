@@ -1,6 +1,5 @@
 """Step 6: one word for all looks, the experiment that would say more, and what stems say alone."""
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,9 +15,9 @@ from stiction_ros.discrepancy.decision.scores import Testable
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.measures import MAJORITY
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
-from stiction_ros.effects import Behaviour, FloatArray, about
+from stiction_ros.effects import FloatArray, about
 
-LEFT = 0.4  # of the last effect's score: what may stay unexplained beside a name
+LEFT = 0.4  # of what is explained: what may stay unexplained beside it
 ACCURATE = 0.01  # of the span of OP: a stem that near follows it
 
 
@@ -27,6 +26,7 @@ def overall(
     effects: Sequence[FoundEffect],
     looks: Sequence[Look],
     testable: Sequence[Testable],
+    gained: float,
 ) -> tuple[GapVerdict, tuple[tuple[str, str], ...]]:
     """Return the verdict of all looks and what stays possible beside the effects.
 
@@ -39,35 +39,26 @@ def overall(
         effects: all others.
         looks: the rounds.
         testable: what the last look could have seen.
+        gained: evidence of all effects and changes of the process together.
     """
-    verdict, alternatives = _of_looks(effects, looks, testable)
-    if shown and not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE):
-        return GapVerdict.NAMED, ()
-    return verdict, alternatives
-
-
-def _of_looks(
-    effects: Sequence[FoundEffect], looks: Sequence[Look], testable: Sequence[Testable]
-) -> tuple[GapVerdict, tuple[tuple[str, str], ...]]:
     last = looks[-1].decision
-    alternatives = [name for effect in effects for name in effect.alternatives]
-    open_set = last.verdict is GapVerdict.AMBIGUOUS and not last.inseparable
-    if not effects:
-        if open_set and last.chosen is not None:
-            if any(noise.enlarged for noise in last.chosen.noise.values()):
-                return GapVerdict.UNKNOWN, ()
-            names = [*last.chosen.candidate.keys, *last.alternatives]
-            return GapVerdict.AMBIGUOUS, tuple(dict.fromkeys(names))
-        if last.verdict is GapVerdict.UNKNOWN:
+    left = max(fit.evidence for fit in looks[-1].scores.fits)
+    unknown = last.verdict is GapVerdict.UNKNOWN and left > LEFT * gained
+    if effects:
+        alternatives = tuple(dict.fromkeys(n for each in effects for n in each.alternatives))
+        return (GapVerdict.UNKNOWN if unknown else effects[0].verdict), alternatives
+    if last.verdict is GapVerdict.AMBIGUOUS and not last.inseparable and last.chosen is not None:
+        if any(noise.enlarged for noise in last.chosen.noise.values()):
             return GapVerdict.UNKNOWN, ()
-        if last.chosen is not None and not looks[-1].kept:
-            return GapVerdict.NONE, ()
-        if not any(t.testable for t in testable if t.place.startswith(("valve:", "process:"))):
-            return GapVerdict.UNTESTABLE, ()
-        return GapVerdict.NONE, ()
-    if last.verdict is GapVerdict.UNKNOWN and _much_left(effects, looks[-1]):
-        return GapVerdict.UNKNOWN, tuple(alternatives)
-    return effects[0].verdict, tuple(dict.fromkeys(alternatives))
+        names = [*last.chosen.candidate.keys, *last.alternatives]
+        return GapVerdict.AMBIGUOUS, tuple(dict.fromkeys(names))
+    if unknown:
+        return GapVerdict.UNKNOWN, ()
+    if shown:
+        return GapVerdict.NAMED, ()
+    seen = any(t.testable for t in testable if t.place.startswith(("valve:", "process:")))
+    refused = last.chosen is not None and not looks[-1].kept
+    return (GapVerdict.NONE if seen or refused else GapVerdict.UNTESTABLE), ()
 
 
 def experiment_for(
@@ -135,85 +126,43 @@ def called(place: str, effect: str, law: str | None = None) -> str:
     return words.get(kind, effect)
 
 
-def _much_left(effects: Sequence[FoundEffect], look: Look) -> bool:
-    outside = [fit for fit in look.scores.fits if not fit.candidate.inside]
-    left = max((fit.delta_bic for fit in outside), default=0.0)
-    return left > LEFT * max(effect.delta_bic for effect in effects)
-
-
-@dataclasses.dataclass(frozen=True)
-class StemLook:
-    """A recorded stem against OP."""
-
-    valve: str  # tag
-    off: float  # root mean square of stem less where the model has it, %, a constant taken out
-    constant: float  # that constant, %
-    moved: bool  # whether the model moves it by anything but OP
-    late: int  # samples by which the stem matches that best; 0 as well where it may be more
-    # the effect of the valve that explains most of the distance; None where none explains enough
-    behaviour: Behaviour | None
-    share: float  # of the squared distance that it explains, 0 to 1
-    span: float  # of OP, %
-
-    @property
-    def sentence(self) -> str:
-        """What it says, for people."""
-        other = "the simulated one" if self.moved else "OP"
-        head = f"the stem of {self.valve} is recorded: it stands {self.off:.2g} % off {other}"
-        if abs(self.constant) > self.off:
-            head += f" about a constant {self.constant:.3g} %"
-        if self.off <= ACCURATE * self.span:
-            return (
-                f"{head} and follows it, so that what the simulation misses lies behind the valve"
-            )
-        if self.late:
-            head += f", and matches it best {self.late} samples later"
-        if self.behaviour is None:
-            return f"{head}; no single effect of a valve explains that"
-        figures = ", ".join(f"{k} {v:.3g}" for k, v in figures_of(self.behaviour).items())
-        share = f"{100.0 * self.share:.0f} %"
-        return f"{head}; {self.behaviour.title()} ({figures}) explains {share} of that"
-
-
-def look_at_stems(run: FreeRun, fits: Sequence[CandidateFit]) -> tuple[StemLook, ...]:
+def stem_sentences(run: FreeRun, fits: Sequence[CandidateFit]) -> list[str]:
     """Return what every stem says that is recorded throughout, effects as they fit PV."""
-    if any(record.stem is None for record in run.runs.records):
-        return ()
-    return tuple(_look(run, j, fits) for j in range(len(run.model.valves)))
+    found = []
+    for j, name in enumerate(run.model.valve_names):
+        stem = run.runs.stem(name)
+        if not np.isnan(stem).any():
+            found.append(f"the stem of {name} is recorded: {_stem_said(run, j, stem, fits)}")
+    return found
 
 
-def _look(run: FreeRun, valve: int, fits: Sequence[CandidateFit]) -> StemLook:
-    name = run.model.valve_names[valve]
-    parts = []
-    for record in run.runs.records:
-        assert record.stem is not None
-        parts.append(record.stem[:, record.valves.index(name)])
-    stem = np.concatenate(parts)
+def _stem_said(run: FreeRun, valve: int, stem: FloatArray, fits: Sequence[CandidateFit]) -> str:
+    """Return how far a stem is off the simulated one, and which effect of its valve explains it."""
     op = run.stems[:, valve]
-    constant = float(np.median(stem - op))
-    before = _left(stem, op[:, None])[0]
-    best, share = None, MAJORITY
+    constant, before = float(np.median(stem - op)), float(_left(stem, op[:, None])[0])
+    off = float(np.sqrt(before / len(stem)))
+    other = "the simulated one" if run.model.valves[valve].effects else "OP"
+    said = f"it stands {off:.2g} % off {other}"
+    if abs(constant) > off:
+        said += f" about a constant {constant:.3g} %"
+    if off <= ACCURATE * float(np.ptp(op)):
+        return f"{said} and follows it, so that what the simulation misses lies behind the valve"
+    lates = range(LONGEST_DELAY + 1)
+    late = int(np.argmin([_left(stem[k:], op[: len(op) - k, None])[0] for k in lates]))
+    if 0 < late < LONGEST_DELAY:
+        said += f", and matches it best {late} samples later"
+    explained = []
     for fit in fits:
         candidate = fit.candidate
-        if not isinstance(candidate, ValveCandidate) or candidate.valve != valve:
-            continue
-        tried = candidate.stems(run, fit.point[None, :], from_measured=True)
-        gone = 1.0 - float(_left(stem, tried)[0]) / max(float(before), 1e-300)
-        if gone > share:
-            best, share = fit.behaviour, gone
-    lates = range(LONGEST_DELAY + 1)
-    shifted = [_left(stem[late:], op[: len(op) - late, None])[0] for late in lates]
-    late = int(np.argmin(shifted))
-    return StemLook(
-        name,
-        float(np.sqrt(before / len(stem))),
-        constant,
-        bool(run.model.valves[valve].effects),
-        late if late < LONGEST_DELAY else 0,
-        best,
-        share if best is not None else 0.0,
-        float(np.ptp(op)),
-    )
+        if isinstance(candidate, ValveCandidate) and candidate.valve == valve:
+            tried = candidate.stems(run, fit.point[None, :], from_measured=True)
+            left = float(_left(stem, tried)[0]) / max(before, 1e-300)
+            explained.append((1.0 - left, candidate.behaviour(fit.point, fit.factors)))
+    share, behaviour = max(explained, key=lambda each: each[0], default=(0.0, None))
+    if behaviour is None or share <= MAJORITY:
+        return f"{said}; no single effect of a valve explains that"
+    figures = ", ".join(f"{k} {v:.3g}" for k, v in figures_of(behaviour).items())
+    return f"{said}; {behaviour.title()} ({figures}) explains {100.0 * share:.0f} % of that"
 
 
 def _left(stem: FloatArray, tried: FloatArray) -> FloatArray:

@@ -250,7 +250,7 @@ def confirmed_by_stem(run: FreeRun, fit: CandidateFit) -> bool:
     candidate = fit.candidate
     if not isinstance(candidate, ValveCandidate):
         return False
-    if any(record.stem is None for record in run.runs.records):
+    if not run.runs.stems_recorded:
         return False
     stems = candidate.stems(run, fit.point[None, :], from_measured=True)[:, 0]
     now = stem_misfit(run, candidate.valve, run.stems[:, candidate.valve])
@@ -265,9 +265,7 @@ def told_by_stem(run: FreeRun, decision: Decision, fits: Sequence[CandidateFit])
     doubt with what lies behind it.
     """
     chosen = decision.chosen
-    if chosen is None or not decision.alternatives:
-        return decision
-    if any(record.stem is None for record in run.runs.records):
+    if chosen is None or not decision.alternatives or not run.runs.stems_recorded:
         return decision
     names = {chosen.candidate.key, *decision.alternatives}
     at_valve = {name for name in names if name[0].startswith("valve:")}
@@ -291,9 +289,4 @@ def told_by_stem(run: FreeRun, decision: Decision, fits: Sequence[CandidateFit])
 
 def stem_misfit(run: FreeRun, valve: int, stems: FloatArray) -> float:
     """Return the sum of squared distances from the measured stems; 0 where none is recorded."""
-    name, total = run.model.valve_names[valve], 0.0
-    for record, rows in zip(run.runs.records, run.runs.slices, strict=True):
-        if record.stem is not None:
-            measured = record.stem[:, record.valves.index(name)]
-            total += float(np.sum((stems[rows] - measured) ** 2))
-    return total
+    return float(np.nansum((stems - run.runs.stem(run.model.valve_names[valve])) ** 2))

@@ -2,15 +2,14 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import LONGEST, declared_noise, seen_noise
 from stiction_ros.effects import FloatArray
-from stiction_ros.signals.autoregression import whiten
 from stiction_ros.texts import spoken
 
 LARGER = 1.25  # times the declared standard deviation, beyond which they disagree
@@ -59,76 +58,56 @@ def free_run_gap(base: Baseline) -> tuple[OutputGap, ...]:
     return tuple(dataclasses.replace(run, one_step_rmse=own.one_step_rmse) for run, own in pairs)
 
 
-def measure_gap(
-    base: Baseline, weights: Sequence[FloatArray] | None = None, every: bool = False
-) -> tuple[OutputGap, ...]:
-    """Return the gap of every output on rows that no figure was fitted to.
-
-    Args:
-        base: the model.
-        weights: per output φ by which its free run is whitened, none of them for no output;
-            None whitens none.
-        every: whether the rows that figures were fitted to count as well, where it is whitened.
-    """
+def measure_gap(base: Baseline) -> tuple[OutputGap, ...]:
+    """Return the gap of every output on rows that no figure was fitted to."""
     found = []
-    for i, name in enumerate(base.run.model.outputs):
-        noise, blocks = base.noise[i], base.blocks[i]
-        residual, floor, held = noise.residual, noise.stationary_std, blocks.held
-        fitted = blocks.train
-        if weights is not None and len(weights[i]):
-            residual, floor = whiten(residual, weights[i]), np.inf
-            held = fitted = held | fitted if every else held
+    for name, noise, blocks in zip(base.run.model.outputs, base.noise, base.blocks, strict=True):
         found.append(
             OutputGap(
                 name,
-                _rms(residual[held]),
-                _rms(noise.innovations[held]),
-                min(floor, _rms(residual[fitted])),
+                rms(noise.residual[blocks.held]),
+                rms(noise.innovations[blocks.held]),
+                min(noise.stationary_std, rms(noise.residual[blocks.train])),
                 noise.innovation_std,
             )
         )
     return tuple(found)
 
 
-def gap_in_one_step(
-    base: Baseline, floors: Sequence[float], every: bool = False
-) -> tuple[OutputGap, ...]:
-    """Return the gap of the innovations in the place of that of the free run.
+class Shrunk(NamedTuple):
+    """What is left of one output without something and with it, units of the output."""
 
-    Args:
-        base: the model.
-        floors: per output the standard deviation of innovations in which nothing is missing; an
-            output with NaN is left out.
-        every: whether the rows that figures were fitted to count as well.
-    """
-    found = []
-    for i, floor in enumerate(floors):
-        if not np.isnan(floor):
-            noise, blocks = base.noise[i], base.blocks[i]
-            left = _rms(noise.innovations[blocks.scored if every else blocks.held])
-            found.append(OutputGap(base.run.model.outputs[i], left, left, floor, floor))
-    return tuple(found)
+    before: float
+    after: float
+    floor: float  # of the model with it: what it caused counts as noise before
+    unit: float  # standard deviation of the innovations
 
 
 def closed_share(before: tuple[OutputGap, ...], after: tuple[OutputGap, ...]) -> float:
-    """Return the share of the free-run excess over the noise floor that is gone.
+    """Return the share of the free-run excess over the noise floor that is gone."""
+    return gone_share(
+        Shrunk(old.free_run_rmse, new.free_run_rmse, new.floor_free_run, new.floor_one_step)
+        for old, new in zip(before, after, strict=True)
+    )
 
-    The floor is that of the model with its effects, since what the effect caused counts as
-    noise before; held-out rows that have less of it by chance have a lower one. Outputs are
-    weighted by their excess in units of their innovations. 0 where there was no excess.
+
+def gone_share(outputs: Iterable[Shrunk]) -> float:
+    """Return the share of the excess over the noise floor that is gone.
+
+    Rows that have less noise by chance have a lower floor. Outputs are weighted by their excess in
+    units of their innovations. 0 where there was no excess.
     """
     excess, gone = 0.0, 0.0
-    for old, new in zip(before, after, strict=True):
-        floor = min(new.floor_free_run, new.free_run_rmse)
-        unit = max(new.floor_one_step, 1e-300)
-        much = max(old.free_run_rmse - floor, 0.0) / unit
-        left = max(new.free_run_rmse - floor, 0.0) / unit
+    for each in outputs:
+        floor, unit = min(each.floor, each.after), max(each.unit, 1e-300)
+        much, left = (max(rmse - floor, 0.0) / unit for rmse in (each.before, each.after))
         excess += much
         gone += much - left
     return gone / excess if excess > 0.0 else 0.0
 
 
-def _rms(values: FloatArray) -> float:
+def rms(values: FloatArray) -> float:
+    """Return the root of the mean square, NaN of nothing."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
 
 

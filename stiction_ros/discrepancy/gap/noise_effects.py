@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -96,11 +96,6 @@ def _without_walks(laws: list[NoiseEffect], lasts: float) -> list[NoiseEffect]:
         or each.intervals["tau"][1] < lasts * math.exp(-CLEAR)
         or each.score < min(walks, default=math.inf) - MARGIN
     ]
-
-
-def named_laws(found: Sequence[NoiseEffect], margin: float) -> tuple[NoiseEffect, ...]:
-    """Return the best law and those that the record does not tell from it."""
-    return tuple(each for each in found if each.score < found[0].score + margin)
 
 
 class _Score(NamedTuple):

@@ -15,12 +15,11 @@ from stiction_ros.discrepancy.answer.found_effects import (
 )
 from stiction_ros.discrepancy.answer.results import Discrepancy
 from stiction_ros.discrepancy.answer.say import (
-    LEFT,
     called,
     experiment_for,
-    look_at_stems,
     overall,
     reason_for,
+    stem_sentences,
 )
 from stiction_ros.discrepancy.decision.decide import GapVerdict, on_the_way, verdict_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
@@ -57,26 +56,23 @@ def closing(task: Task, looked: State) -> Discrepancy:
         assert state.doubted is not None
         looked = settle(task, state.doubted)
         state, found = _named(task, looked)
-    before, after = free_run_gap(state.before), free_run_gap(state.now.base)
+    base = state.now.base
+    before, after = free_run_gap(state.before), free_run_gap(base)
     louder = _louder(task, state)
     shown, answers = [of_data(finding) for finding in task.data], [*found, *louder]
     effects = [*shown, *answers]
-    verdict, alternatives = overall(shown, answers, state.looks, state.testable)
+    gained = state.before.score - base.score + sum(noise.delta_bic for noise in louder)
+    verdict, alternatives = overall(shown, answers, state.looks, state.testable, gained)
     model = state.now.bare
     for named, added in zip(found, state.now.effects, strict=True):
         model = model.with_effect(added.place, added.behaviour, **_provenance(task, named))
     for noise in louder:
         model = model.with_effect(noise.place, noise.behaviour, **_provenance(task, noise))
-    noises = check_noise(state.now.base)
+    noises = check_noise(base)
     kept = {e.fit.candidate.key for e in state.now.effects}
     no_names = [
         called(*e.fit.candidate.key) for e in looked.now.effects if e.fit.candidate.key not in kept
     ]
-    if verdict is GapVerdict.UNKNOWN and state.now.changes:
-        base = state.now.base
-        gained = state.before.bic - base.bic + base.held_gain(state.before)
-        if max(fit.evidence for fit in state.looks[-1].scores.fits) < LEFT * gained:
-            verdict = effects[0].verdict if effects else GapVerdict.NONE
     silent = not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE)
     if silent and no_names:
         verdict = GapVerdict.UNKNOWN
@@ -106,7 +102,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
         controller=task.controller,
         runs=task.runs,
         base_before=state.before,
-        base_after=state.now.base,
+        base_after=base,
         seconds=time.perf_counter() - task.begun,
         notes=(*task.gate.notes, *(n for r in task.runs.records for n in r.notes)),
     )
@@ -127,7 +123,7 @@ def _where(
     found: list[str] = []
     if verdict is not GapVerdict.NONE:
         first = state.looks[0]
-        found += [each.sentence for each in look_at_stems(state.before.run, first.scores.fits)]
+        found += stem_sentences(state.before.run, first.scores.fits)
         found += () if first.kept else first.where.sentences
     found += noise_sentences(check_noise(state.before), task.runs.sample_time)
     if state.now.effects:
