@@ -7,4 +7,6 @@ NEARLY_ALL = 0.9  # of a thing
 NORMAL = 1.96  # standard errors on either side that hold 95 %
 ROUNDING = 1e-9  # of a size: less is none
 GAUSS_NEWTON = 20  # steps of a search that has not settled before
+OUTLYING = 8.0  # times the usual size: what is larger is another thing, as a move of SP or a spike
+TRIED = 3  # of the best, that are tried as wholes
 TURNS = 2  # in which effects, and a process that is fitted with them, are fitted again

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.filled import drawn, held
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
-from stiction_ros.discrepancy.measures import MAJORITY
+from stiction_ros.discrepancy.measures import MAJORITY, OUTLYING
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
 from stiction_ros.effects.behaviour import BoolArray, IntArray
@@ -24,7 +24,6 @@ LONGEST_REST = 12
 ENDS = 6
 ALIKE = 0.02  # share by which two quanta, or two ends over the range of PV, may differ
 LATTICE = 1e-3  # of the range of PV: coarser rounding makes single values stand out
-ALONE = 8.0  # usual distances from the mean of both neighbours, beyond which one is a spike
 COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a finding
 
 
@@ -289,10 +288,10 @@ def _alone(values: FloatArray) -> BoolArray:
     beside = 0.5 * (values[:-2] + values[2:])
     away, apart = np.abs(values[1:-1] - beside), np.abs(values[2:] - values[:-2])
     scale = max(float(np.median(away)), LATTICE * float(np.ptp(values)))
-    found[1:-1] = (away > ALONE * scale) & (apart < 0.5 * away)
+    found[1:-1] = (away > OUTLYING * scale) & (apart < 0.5 * away)
     beside, apart = 0.5 * (values[:-3] + values[3:]), np.abs(values[3:] - values[:-3])
     away = np.minimum(np.abs(values[1:-2] - beside), np.abs(values[2:-1] - beside))
-    pairs = (away > ALONE * scale) & (apart < 0.5 * away)
+    pairs = (away > OUTLYING * scale) & (apart < 0.5 * away)
     found[1:-2] |= pairs
     found[2:-1] |= pairs
     return found

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.discrepancy.measures import OUTLYING
 from stiction_ros.discrepancy.simulation.free_run import FEWEST, Runs
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel
 
 LIKE_PV = (0.15, 2.0)  # times the spread of PV about its neighbours; a quarter where it is smooth
-USUAL = 6.0  # times the usual change of the error, beyond which SP has moved
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,7 +86,7 @@ def _fitted(parts: "Sequence[_Part]") -> tuple[float, float]:
     change = np.concatenate([np.diff(part.error) for part in parts])
     error = np.concatenate([part.error[1:] + between_samples(part.error) for part in parts])
     usual = float(np.median(np.abs(change)))
-    rests = np.concatenate([_rests(part.error, USUAL * usual) for part in parts])
+    rests = np.concatenate([_rests(part.error, OUTLYING * usual) for part in parts])
     asked = np.isfinite(moves) & rests
     columns = np.column_stack([change, error])
     gain, integral = np.linalg.lstsq(columns[asked], moves[asked], rcond=None)[0].tolist()

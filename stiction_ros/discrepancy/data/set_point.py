@@ -12,14 +12,13 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from stiction_ros.discrepancy.data.scans import between_samples
-from stiction_ros.discrepancy.measures import MAJORITY, ROUNDING
+from stiction_ros.discrepancy.measures import MAJORITY, OUTLYING, ROUNDING
 from stiction_ros.discrepancy.simulation.free_run import FEWEST, Runs
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel, PiTuning
 from stiction_ros.signals.holds import stretches
 
 TURNS = 30  # of the weights that make the sum of sizes least
-OUTSIDE = 8.0  # times the usual size of what a law leaves, beyond which SP has moved
 NORMAL_OF_MEDIAN = 1.4826  # σ of normal values, by the median of their sizes
 MOST_MOVES = 0.1  # of the samples: what moves more often is nothing that an operator sets
 
@@ -91,7 +90,7 @@ class _Part:
     def set_point(self, gain: float, integral: float, usual: float) -> FloatArray | None:
         """Return SP, shape (N,); None where it moves too often."""
         told = self.moves + self.columns @ np.array([gain, integral])
-        moved = self.free & (np.abs(np.diff(told, prepend=told[0])) > OUTSIDE * usual)
+        moved = self.free & (np.abs(np.diff(told, prepend=told[0])) > OUTLYING * usual)
         begins, _ = stretches(moved)
         rests = self.free & ~moved
         if len(begins) > MOST_MOVES * len(told) or not rests.any():

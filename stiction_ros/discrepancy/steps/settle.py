@@ -13,6 +13,7 @@ from stiction_ros.discrepancy.decision.decide import (
 )
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.fit.search import CandidateFit
+from stiction_ros.discrepancy.measures import TRIED
 from stiction_ros.discrepancy.steps.look import look_on, scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import Keys, best_whole, mended, singles
@@ -22,7 +23,6 @@ APART = 5.0  # samples between a step and its opposite that are outliers togethe
 CANCEL = 0.25  # of the larger one, that such two may leave
 UNTOLD = 0.15  # of the band of a friction, by which a stem rests elsewhere than its law says
 NEAR = 40.0  # evidence, by which a rival may be behind beside figures that were fitted without it
-RIVALS = 2  # that are tried in the place of an effect
 
 
 def settle(task: Task, state: State) -> State:
@@ -158,4 +158,4 @@ def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]
         and not others.now.tells(f)
         and not (own.about.family == f.candidate.about.family == FRICTION)
     ]
-    return twins, alike[:RIVALS]
+    return twins, alike[:TRIED]

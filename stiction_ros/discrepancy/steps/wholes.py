@@ -12,6 +12,7 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import spans_steps
 from stiction_ros.discrepancy.gap.noise_effects import noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
+from stiction_ros.discrepancy.measures import TRIED
 from stiction_ros.discrepancy.process.change import changed_process
 from stiction_ros.discrepancy.steps.state import State, Task
 
@@ -20,8 +21,6 @@ INEXACT = 0.01
 the letter, and what the law misses weighs the more the more it explains."""
 LAWS = 100.0  # BIC that a law of the noise may gain over an autoregression
 Keys = tuple[tuple[str, str], ...]
-SINGLES = 4  # effects of the first look that are tried alone against several together
-BEHIND = 3  # effects that are tried behind another process where none was found
 
 
 class ToldNoise(NamedTuple):
@@ -67,7 +66,7 @@ def best_whole(now: Explanation, singles: Sequence[AddedEffect], margin: float) 
         for count in range(1, len(added)):
             tried += [now.refitted(part) for part in itertools.combinations(added, count)]
         known = {each.fit.candidate.key for each in added}
-        others = [each for each in singles if each.fit.candidate.key not in known][:SINGLES]
+        others = [each for each in singles if each.fit.candidate.key not in known][:TRIED]
         tried += [now.holding([alone]) for alone in others]
     least = min(each.worth(price) for each in tried)
     loads = not any(on_the_way(each.place, each.effect) for each in added)
@@ -143,7 +142,7 @@ def mended(task: Task, state: State) -> State | None:
     if not suspicious(state.now.base):
         return None
     margin, added = task.options.margin, state.now.effects
-    parts = [(), *((each,) for each in added or singles(state)[:BEHIND])]
+    parts = [(), *((each,) for each in added or singles(state)[:TRIED])]
     parts += [added] if len(added) > 1 else []
     found = _best(task, [with_process(task, state, part) for part in parts])
     due = margin if added else 0.0
