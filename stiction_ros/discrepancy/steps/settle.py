@@ -2,7 +2,7 @@
 
 import dataclasses
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.decision.decide import (
@@ -17,11 +17,9 @@ from stiction_ros.discrepancy.measures import TRIED
 from stiction_ros.discrepancy.steps.look import look_on, scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import Keys, best_whole, mended, singles
-from stiction_ros.effects import Backlash, about
+from stiction_ros.effects import Backlash, StepDisturbance, about
 
-APART = 5.0  # samples between a step and its opposite that are outliers together
-CANCEL = 0.25  # of the larger one, that such two may leave
-UNTOLD = 0.15  # of the band of a friction, by which a stem rests elsewhere than its law says
+CANCEL = 0.25  # of the larger one, that two opposite steps may leave
 NEAR = 40.0  # evidence, by which a rival may be behind beside figures that were fitted without it
 
 
@@ -38,36 +36,29 @@ def best_of_wholes(task: Task, state: State) -> State:
     """Keep the best whole explanation: a part of what was found, or one effect alone."""
     alone = [each for each in singles(state) if confirmed(each.fit)]
     best = best_whole(state.now, alone, task.options.margin)
-    kept = without_outliers(best.effects, task.runs.sample_time)
-    if len(kept) < len(best.effects):
-        best = best.refitted(kept)
-    return dataclasses.replace(state, now=best)
+    kept = without_slips(best.effects)
+    return dataclasses.replace(
+        state, now=best.refitted(kept) if len(kept) < len(best.effects) else best
+    )
 
 
-def without_outliers(effects: Sequence[AddedEffect], sample_time: float) -> tuple[AddedEffect, ...]:
-    """Return effects without steps that another one takes back.
+def without_slips(effects: Sequence[AddedEffect]) -> tuple[AddedEffect, ...]:
+    """Return effects without pairs of opposite load steps beside a friction, within its band.
 
-    Two opposite steps a few samples apart are outliers. Beside a friction, two opposite steps no
-    larger than its band are a slip at another place than the law says, and the next slip. A single
-    step of a small part of the band is the error of the law in where the stem rests.
-
-    Args:
-        effects: those of an explanation.
-        sample_time: of the records, s.
+    They are a slip at another place than the law says, and the next slip.
     """
-    steps = [each for each in effects if each.fit.candidate.dated and len(each.fit.factors) == 1]
-    bands = {each.place: band_of(each) for each in effects if about(each.effect).family == FRICTION}
-    gone = [step for step in steps if _size(step) <= UNTOLD * _band(step, bands)]
+    frictions = [each for each in effects if about(each.effect).family == FRICTION]
+    bands = {each.place.replace("valve:", "load:"): band_of(each) for each in frictions}
+    step = StepDisturbance.effect
+    steps = [each for each in effects if each.effect == step and each.place in bands]
+    gone: set[int] = set()
     for one, other in itertools.combinations(steps, 2):
-        if one.fit.candidate.key != other.fit.candidate.key or _is_in(one, gone):
-            continue
-        apart = abs(float(one.fit.point[0] - other.fit.point[0]))
-        total = float(one.fit.factors[0] + other.fit.factors[0])
-        largest = max(_size(one), _size(other))
-        near = apart <= APART * sample_time or largest <= _band(one, bands)
-        if near and not _is_in(other, gone) and abs(total) <= CANCEL * largest:
-            gone += [one, other]
-    return tuple(each for each in effects if not _is_in(each, gone))
+        sizes = [float(each.fit.factors[0]) for each in (one, other)]
+        largest, pair = max(map(abs, sizes)), {id(one), id(other)}
+        same = one.fit.candidate.key == other.fit.candidate.key and not pair & gone
+        if same and largest <= bands[one.place] and abs(sum(sizes)) <= CANCEL * largest:
+            gone |= pair
+    return tuple(each for each in effects if id(each) not in gone)
 
 
 def band_of(friction: AddedEffect) -> float:
@@ -76,19 +67,6 @@ def band_of(friction: AddedEffect) -> float:
     if friction.effect == Backlash.effect:
         return figures["band"]
     return figures["f_s"] + figures["f_d"]
-
-
-def _size(step: AddedEffect) -> float:
-    return abs(float(step.fit.factors[0]))
-
-
-def _band(step: AddedEffect, bands: Mapping[str, float]) -> float:
-    """Return the band of the friction of the valve at which a load steps; 0 where there is none."""
-    return bands.get(step.place.replace("load:", "valve:"), 0.0)
-
-
-def _is_in(effect: AddedEffect, others: Sequence[AddedEffect]) -> bool:
-    return any(effect is each for each in others)
 
 
 def told_again(task: Task, state: State) -> State:

@@ -1,4 +1,4 @@
-"""Steps that another one takes back."""
+"""Steps that another one takes back, beside a friction."""
 
 import types
 from typing import Any, cast
@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
-from stiction_ros.discrepancy.steps.settle import band_of, without_outliers
+from stiction_ros.discrepancy.steps.settle import band_of, without_slips
 from stiction_ros.effects import Backlash, Behaviour, HeStiction, StepDisturbance
 
 
@@ -28,30 +28,18 @@ def step(time: float, size: float) -> AddedEffect:
 STICKY = added("valve:V1", HeStiction(4.0, 1.5), [5.5, 0.4])
 
 
-def test_a_step_and_its_opposite_a_few_samples_later_are_no_effects() -> None:
-    assert without_outliers([step(100.0, 9.0), step(103.0, -8.5)], 1.0) == ()
-
-
-def test_far_apart_they_stay() -> None:
+def test_opposite_steps_without_a_friction_stay() -> None:
     steps = (step(100.0, 2.0), step(300.0, -2.0))
-    assert without_outliers(steps, 1.0) == steps
+    assert without_slips(steps) == steps
 
 
 def test_beside_a_friction_they_are_a_stem_that_stood_elsewhere() -> None:
-    assert without_outliers([STICKY, step(100.0, 2.0), step(300.0, -2.0)], 1.0) == (STICKY,)
+    assert without_slips([STICKY, step(100.0, 2.0), step(300.0, -2.0)]) == (STICKY,)
 
 
 def test_larger_ones_than_its_band_stay_beside_a_friction() -> None:
     effects = (STICKY, step(100.0, 7.0), step(300.0, -7.0))
-    assert without_outliers(effects, 1.0) == effects
-
-
-def test_a_small_part_of_the_band_of_a_friction_is_where_its_stem_rests() -> None:
-    assert without_outliers([STICKY, step(100.0, -0.8)], 1.0) == (STICKY,)
-    larger = (STICKY, step(100.0, -0.9))
-    assert without_outliers(larger, 1.0) == larger
-    alone = (step(100.0, -0.8),)
-    assert without_outliers(alone, 1.0) == alone
+    assert without_slips(effects) == effects
 
 
 def test_the_band_of_a_play_is_its_own() -> None:
