@@ -4,13 +4,12 @@ The compiled loops let other threads run, so two threads share most of the work.
 back does not depend on how many there are: every part is computed as it would be alone.
 """
 
-import collections
 import functools
 import multiprocessing
 import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar, cast
 
 import numpy as np
@@ -59,32 +58,10 @@ def together(*parts: Callable[[], Result]) -> list[Result]:
     """
     if len(parts) < 2 or not may_help() or not _free.acquire(blocking=False):
         return [part() for part in parts]
-    results: list[Future[Result]] = [Future() for _ in parts]
-    waiting = collections.deque(zip(parts, results, strict=True))
-
-    def settle(part: Callable[[], Result], result: Future[Result]) -> None:
-        try:
-            result.set_result(part())
-        except Exception as error:
-            result.set_exception(error)
-
-    def work(take: Callable[[], tuple[Callable[[], Result], Future[Result]]]) -> None:
-        while waiting:
-            try:
-                taken = take()
-            except IndexError:  # the other thread took the last part
-                return
-            settle(*taken)
-
-    def help_out() -> None:
-        try:
-            work(waiting.pop)
-        finally:
-            _free.release()
-
-    own = waiting.popleft()
-    helping = _helper().submit(help_out)
-    settle(*own)
-    work(waiting.popleft)
-    helping.result()  # so that it is free for the next call
-    return [result.result() for result in results]
+    waiting = [_helper().submit(part) for part in reversed(parts[1:])][::-1]
+    released = _helper().submit(_free.release)
+    results = [parts[0]()]
+    for part, future in zip(parts[1:], waiting, strict=True):
+        results.append(part() if future.cancel() else future.result())
+    released.result()  # so that the thread is free for the next call
+    return results
