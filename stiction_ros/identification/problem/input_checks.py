@@ -16,8 +16,6 @@ relation and no evidence; nor where a column follows exactly from the past, as t
 noise and the process may obey an exact relation of its own.
 """
 
-import enum
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
@@ -82,13 +80,6 @@ def require_samples(record: Record, needed: int, fix: str) -> None:
         raise InputError(
             f"{len(record)} samples are too few, {needed} are needed", where=record.name, fix=fix
         )
-
-
-class _Past(enum.Enum):
-    """What a column is computed from; the value is the least lag of the other columns."""
-
-    AND_PRESENT = 0
-    ALONE = 1
 
 
 def swapped_columns(record: Record) -> str | None:
@@ -178,7 +169,7 @@ def _follows_from_the_past(op: FloatArray, pv: FloatArray) -> bool:
     """Tell whether a column is an exact function of earlier samples alone."""
     directions = [(column, pv) for column in op] + [(column, op) for column in pv]
     return any(
-        _fit(own, others, order, _Past.ALONE) is not None
+        _fit(own, others, order, least=1) is not None
         for own, others in directions
         for order in range(1, MAX_ORDER + 1)
     )
@@ -214,47 +205,44 @@ def _share(coefficients: FloatArray) -> float:
     return float(abs(coefficients.sum()) / max(float(np.abs(coefficients).sum()), 1e-300))
 
 
-def _fit(
-    own: FloatArray, others: FloatArray, order: int, past: _Past = _Past.AND_PRESENT
-) -> FloatArray | None:
+def _fit(own: FloatArray, others: FloatArray, order: int, least: int = 0) -> FloatArray | None:
     """Return the coefficients of an exact relation of ``order``, or None.
 
-    They are a₁ … a_n with the sign turned, then b₀ … b_n of each other column. With the past
-    alone b₀ is left out, and the relation need not be unique.
+    They are a₁ … a_n with the sign turned, then b₀ … b_n of each other column. Where 1
+    is the ``least`` lag of the others, b₀ is left out and the relation need not be unique.
     """
-    # Compiled code takes half a second to import, which those who identify nothing save.
-    from stiction_ros.identification.problem.exact_relation import explained_stretches
-
     count = len(own) - order
-    width = max(3 * (order + len(others) * (order + 1 - past.value)), 30)
+    width = max(3 * (order + len(others) * (order + 1 - least)), 30)
     if count < 2 * width:
-        return None
-    starts = np.unique(np.linspace(0, count - width, WINDOWS).astype(int))
-    may = explained_stretches(own, others, (order, past.value), starts, width, EXACT)
-    if not may.any():
         return None
     columns = lagged(own, range(1, order + 1), order)
     for other in others:
-        columns += lagged(other, range(past.value, order + 1), order)
+        columns += lagged(other, range(least, order + 1), order)
     regressors, target = np.column_stack(columns), own[order:]
-    moving, starts = target != 0.0, starts[may]
+    stretches = np.unique(np.linspace(0, count - width, WINDOWS).astype(int))[:, None]
+    stretches = stretches + np.arange(width)
+    whole = np.column_stack([regressors, target])[stretches]
+    left = np.abs(np.asarray(np.linalg.qr(whole, mode="r"))[:, -1, -1])
+    stretches = stretches[left <= 2.0 * EXACT * np.sqrt(width)]
+    moving = target != 0.0
     if not moving.any():
         return None
-    for begin in range(0, len(starts), FEW):  # mostly the first few will do
-        rows = starts[begin : begin + FEW, None] + np.arange(width)
-        for theta in _solutions(regressors[rows], target[rows], past):
+    for begin in range(0, len(stretches), FEW):  # mostly the first few will do
+        rows = stretches[begin : begin + FEW]
+        for theta in _solutions(regressors[rows], target[rows], unique=not least):
             error = np.abs(regressors[moving] @ theta - target[moving])
             if np.mean(error < CLOSE) >= SHARE:
                 return np.asarray(theta)
     return None
 
 
-def _solutions(regressors: FloatArray, target: FloatArray, past: _Past) -> FloatArray:
+def _solutions(regressors: FloatArray, target: FloatArray, unique: bool) -> FloatArray:
     """Return coefficients, shape (…, q), of the stretches that they explain.
 
     Args:
         regressors: shape (stretches, width, q).
         target: shape (stretches, width).
+        unique: whether others than these must not explain them as well.
     """
     left, singular, right = np.linalg.svd(regressors, full_matrices=False)
     kept = singular > np.finfo(float).eps * regressors.shape[1] * singular[:, :1]
@@ -263,6 +251,6 @@ def _solutions(regressors: FloatArray, target: FloatArray, past: _Past) -> Float
     solutions = np.einsum("wji,wj->wi", right, along)
     residual = np.einsum("wij,wj->wi", regressors, solutions) - target
     explained = np.abs(residual).max(axis=1) <= EXACT
-    if past is _Past.AND_PRESENT:
+    if unique:
         explained &= singular[:, -1] > SINGULAR * singular[:, 0]
     return np.asarray(solutions[explained])
