@@ -15,13 +15,14 @@ from stiction_ros.identification.kernels.output_error import (
     evaluate,
     normal_equations,
 )
-from stiction_ros.identification.kernels.row import lag_products
+from stiction_ros.identification.kernels.row import factor, lag_products, solved
 from stiction_ros.signals.polynomials import is_stable, pulled_inside
 
 MAX_RADIUS = 0.9995
 START_RADIUS = 0.99
 REFINEMENTS = 4  # of the start, as Steiglitz and McBride
 FIRST, LEAST, HARDEST = 1e-4, 1e-9, 1e6  # damping
+LOAD = 1e-10  # damping of a noise model
 
 
 class Start(NamedTuple):
@@ -33,46 +34,16 @@ class Start(NamedTuple):
 
 
 @compiled
-def _balance(gram: FloatArray, gradient: FloatArray) -> FloatArray:
-    """Scale a system so that its diagonal is one, in place; return the scales."""
-    size = len(gradient)
-    scale = np.ones(size)  # a coefficient without influence stays where it is
-    for i in range(size):
-        if gram[i, i] > 1e-200:
-            scale[i] = np.sqrt(gram[i, i])
-    for i in range(size):
-        gradient[i] /= scale[i]
-        for j in range(size):
-            gram[i, j] /= scale[i] * scale[j]
-    return scale
+def _damped_step(gram: FloatArray, gradient: FloatArray, damping: float) -> FloatArray:
+    """Return the solution with a diagonal that is larger by a share ``damping``.
 
-
-@compiled
-def _definite_solve(matrix: FloatArray, damping: float, right: FloatArray) -> FloatArray:
-    """Return the solution with ``damping`` added to the diagonal; empty if not definite."""
-    size = len(matrix)
-    root, out = matrix.copy(), right.copy()
+    A coefficient without influence stays where it is.
+    """
+    size, damped = len(gradient), gram.copy()
     for i in range(size):
-        root[i, i] += damping
-    for i in range(size):
-        for j in range(i + 1):
-            value = root[i, j]
-            for before in range(j):
-                value -= root[i, before] * root[j, before]
-            if j < i:
-                root[i, j] = value / root[j, j]
-            elif value > 0.0:
-                root[i, i] = np.sqrt(value)
-            else:
-                return np.empty(0)
-        for j in range(i):
-            out[i] -= root[i, j] * out[j]
-        out[i] /= root[i, i]
-    for i in range(size - 1, -1, -1):
-        for j in range(i + 1, size):
-            out[i] -= root[j, i] * out[j]
-        out[i] /= root[i, i]
-    return out
+        damped[i, i] *= 1.0 + damping
+    root, kept, number = factor(damped, size)
+    return solved(root, kept, number, gradient, size)
 
 
 @compiled
@@ -87,7 +58,7 @@ def descend(
     count, order, table = len(problem.y) - problem.first, len(start.a) - 1, room.tables[1]
     a, noise, weight = start.a, start.noise, FREE_RUN_WEIGHT * start.energy / problem.energy
     damping, before, done, priced = FIRST, np.inf, -1, weight > 0.0
-    gram, gradient, scale = np.empty((0, 0)), np.empty(0), np.empty(0)
+    gram, gradient = np.empty((0, 0)), np.empty(0)
     while True:
         found = False
         if done < 0 or is_stable(a, MAX_RADIUS):
@@ -103,41 +74,31 @@ def descend(
             if done == most or (done and little):
                 return point
             gram, gradient = normal_equations(problem, room, point)
-            scale, before = _balance(gram, gradient), point.total
-            step = _definite_solve(gram, LEAST, gradient)  # nearly that of Gauss and Newton
-            if len(step) and count * np.dot(step, gradient) < gains[1] * before:
+            before = point.total
+            step = _damped_step(gram, gradient, LEAST)  # nearly that of Gauss and Newton
+            if count * np.dot(step, gradient) < gains[1] * before:
                 return point
         else:
             damping *= 5.0
-        step = np.empty(0)
-        while not len(step) and damping < HARDEST:
-            step = _definite_solve(gram, damping, gradient)
-            damping *= 1.0 if len(step) else 5.0
-        if not len(step):
+        if not damping < HARDEST:
             return point
+        step = _damped_step(gram, gradient, damping)
         a, noise = point.a.copy(), point.noise.copy()
         for i in range(order):
             for j in range(order):
-                a[1 + j] -= table[i, j] * step[i] / scale[i]
+                a[1 + j] -= table[i, j] * step[i]
         for i in range(len(noise) - 1):
-            noise[1 + i] -= step[order + i] / scale[order + i]
+            noise[1 + i] -= step[order + i]
 
 
 @compiled
 def noise_model(w: FloatArray, order: int) -> FloatArray:
     """Return monic D of order ``order`` by least squares over w[order:]."""
     products = lag_products(w, order)
-    matrix, right = np.zeros((order, order)), np.zeros(order)
+    out = np.ones(order + 1)
+    step = _damped_step(products[1:, 1:].T.copy(), products[0, 1:], LOAD)
     for i in range(order):
-        right[i] = -products[0, i + 1]
-        for j in range(i, order):
-            matrix[i, j] = matrix[j, i] = products[i + 1, j + 1]
-        matrix[i, i] = matrix[i, i] * (1.0 + 1e-10) + 1e-300
-    out = np.zeros(order + 1)
-    out[0] = 1.0
-    solution = _definite_solve(matrix, 0.0, right)
-    for i in range(len(solution)):
-        out[1 + i] = solution[i]
+        out[1 + i] = -step[i]
     return out
 
 

@@ -126,8 +126,7 @@ def evaluate(
     averaged(noise, y, problem.first, count, rows[size])
     _price(problem, scale, y[problem.begin :], rows[size])
     gram = np.dot(rows[: size + 1], rows[: size + 1].T)
-    root, kept = np.empty((size, size)), np.empty(size, dtype=np.int64)
-    number = factor(gram, size, root, kept)
+    root, kept, number = factor(gram, size)
     theta = solved(root, kept, number, gram[size], size)
     residual, free_run = rows[size], np.dot(theta, room.plain)
     explained = np.dot(theta, rows[:size])
@@ -215,8 +214,7 @@ def arx_polynomial(problem: Problem, room: Room, a: FloatArray) -> FloatArray:
     for k in range(count):
         level[k], target[k] = 1.0, y[k]
     gram = np.dot(rows[: size + 1], rows[: size + 1].T)
-    root, kept = np.empty((size, size)), np.empty(size, dtype=np.int64)
-    number = factor(gram, size, root, kept)
+    root, kept, number = factor(gram, size)
     theta = solved(root, kept, number, gram[size], size)
     out = np.ones(order + 1)
     for j in range(order):

@@ -4,54 +4,44 @@ import numpy as np
 
 from stiction_ros.compiled import compiled, compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
+from stiction_ros.identification.kernels.copies import put
 
-SHORT = 3  # largest n_a for which the recursion is written out
 DEPENDENT = 1e-6  # pivot of a scaled column, as a root, below which it depends on the others
 EMPTY = 1e-12
 
 
 @compiled_fused
-def _short_pair(
+def _driven_pair(
     a: FloatArray, x: FloatArray, z: FloatArray, first: FloatArray, second: FloatArray
 ) -> None:
-    """Write x / A and z / A for n_a ≤ 3, side by side, as each waits for its last value."""
+    """Write x / A and z / A side by side, as each waits for its last values."""
+    order = len(a) - 1
     a1, a2, a3 = 0.0, 0.0, 0.0
-    if len(a) > 1:
+    if order > 0:
         a1 = a[1]
-    if len(a) > 2:
+    if order > 1:
         a2 = a[2]
-    if len(a) > 3:
+    if order > 2:
         a3 = a[3]
-    p0 = p1 = q0 = q1 = r0 = r1 = 0.0  # one, two and three samples before
+    p0 = p1 = q0 = q1 = r0 = r1 = 0.0  # one, two and three samples before stay in registers
     for k in range(len(x)):
-        y0 = (x[k] - a3 * r0 - a2 * q0) - a1 * p0
-        y1 = (z[k] - a3 * r1 - a2 * q1) - a1 * p1
+        y0, y1 = x[k], z[k]
+        for i in range(min(order, k), 3, -1):
+            y0 -= a[i] * first[k - i]
+            y1 -= a[i] * second[k - i]
+        y0 = (y0 - a3 * r0 - a2 * q0) - a1 * p0
+        y1 = (y1 - a3 * r1 - a2 * q1) - a1 * p1
         first[k], second[k] = y0, y1
         r0, q0, p0 = q0, p0, y0
         r1, q1, p1 = q1, p1, y1
 
 
-@compiled_fused
-def _long(a: FloatArray, x: FloatArray, out: FloatArray) -> None:
-    """Write x / A for any n_a."""
-    order = len(a) - 1
-    for k in range(len(x)):
-        value = x[k]
-        for i in range(min(order, k), 0, -1):
-            value -= a[i] * out[k - i]
-        out[k] = value
-
-
 @compiled
 def driven_rows(a: FloatArray, signals: FloatArray, begin: int, end: int, out: FloatArray) -> None:
     """Write rows ``begin`` to ``end`` of the signals through 1/A, from rest."""
-    if len(a) <= SHORT + 1:
-        for row in range(begin, end, 2):
-            other = min(row + 1, end - 1)
-            _short_pair(a, signals[row], signals[other], out[row], out[other])
-    else:
-        for row in range(begin, end):
-            _long(a, signals[row], out[row])
+    for row in range(begin, end, 2):
+        other = min(row + 1, end - 1)
+        _driven_pair(a, signals[row], signals[other], out[row], out[other])
 
 
 @compiled_fused
@@ -65,6 +55,20 @@ def averaged(d: FloatArray, x: FloatArray, start: int, length: int, out: FloatAr
         x0, x1, x2 = x[start - i :], x[start - two :], x[start - three :]
         for k in range(length):
             out[k] += d0 * x0[k] + d1 * x1[k] + d2 * x2[k]
+
+
+@compiled
+def through(
+    rows: FloatArray, numerator: FloatArray, denominator: FloatArray, count: int
+) -> FloatArray:
+    """Return rows, followed by zeros, through D/A from rest, shape (q, N)."""
+    order, padded = len(numerator) - 1, np.zeros(len(numerator) - 1 + count)
+    moved, out = np.empty((len(rows), count)), np.empty((len(rows), count))
+    for i in range(len(rows)):
+        put(padded[order:], rows[i])
+        averaged(numerator, padded, order, count, moved[i])
+    driven_rows(denominator, moved, 0, len(rows), out)
+    return out
 
 
 @compiled_fused
@@ -93,18 +97,14 @@ def differences(
 
 
 @compiled
-def factor(gram: FloatArray, size: int, root: FloatArray, kept: IntArray) -> int:
-    """Write the Cholesky factor of the kept ones of the first ``size`` rows of a Gram matrix.
-
-    Rows that depend on those before them are left out.
-
-    Args:
-        root: for the factor, shape (size, size).
-        kept: for the indices of the rows, shape (size,).
+def factor(gram: FloatArray, size: int) -> tuple[FloatArray, IntArray, int]:
+    """Return a Cholesky factor for the first ``size`` rows of a Gram matrix.
 
     Returns:
-        How many rows are kept.
+        The factor of the rows that are kept, as those that depend on others before them are left
+        out, in the upper left; the indices of the rows; how many there are.
     """
+    root, kept = np.empty((size, size)), np.empty(size, dtype=np.int64)
     largest, number = 0.0, 0
     for i in range(size):
         largest = max(largest, gram[i, i])
@@ -123,7 +123,7 @@ def factor(gram: FloatArray, size: int, root: FloatArray, kept: IntArray) -> int
             root[number, number] = np.sqrt(rest)
             kept[number] = i
             number += 1
-    return number
+    return root, kept, number
 
 
 @compiled
