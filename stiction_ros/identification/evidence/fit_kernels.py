@@ -42,17 +42,24 @@ def factorised(matrix: FloatArray) -> float:
 
 
 @compiled_fused
+def explained_by(factor: FloatArray, right: FloatArray) -> float:
+    """Turn the right side into L⁻¹ of it; return what the solution explains of the energy."""
+    explained = 0.0
+    for i in range(len(right)):
+        for k in range(i):
+            right[i] -= factor[i, k] * right[k]
+        right[i] /= factor[i, i]
+        explained += right[i] * right[i]
+    return explained
+
+
+@compiled_fused
 def solved(factor: FloatArray, right: FloatArray) -> tuple[FloatArray, float]:
     """Return the solution for a Cholesky factor, and what it explains of the energy."""
-    size = len(right)
-    out, explained = right.copy(), 0.0
-    for i in range(size):
-        for k in range(i):
-            out[i] -= factor[i, k] * out[k]
-        out[i] /= factor[i, i]
-        explained += out[i] * out[i]
-    for i in range(size - 1, -1, -1):
-        for k in range(i + 1, size):
+    out = right.copy()
+    explained = explained_by(factor, out)
+    for i in range(len(out) - 1, -1, -1):
+        for k in range(i + 1, len(out)):
             out[i] -= factor[k, i] * out[k]
         out[i] /= factor[i, i]
     return out, explained
@@ -70,6 +77,25 @@ class Known(NamedTuple):
 
 
 @compiled_fused
+def beside_prior(
+    products: FloatArray, seen: FloatArray, known: Known, k: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return products, shape (q, q), and those with the output, (q,), with prior ``k`` added."""
+    size, lines = known.precisions.shape[1], known.waves.shape[1]
+    out, right = products.copy(), seen.copy()
+    for w in range(lines):
+        out[1 + w, 1 + w] += known.waves[k, w]
+    for begin in range(1 + lines, len(out), size):
+        add_block(out[begin : begin + size, begin : begin + size], known.precisions[k])
+    if known.at >= 0:
+        end = known.at + size
+        add_block(out[known.at : end, known.at : end], known.held[k])
+        for i in range(size):
+            right[known.at + i] += known.pulls[k, i]
+    return out, right
+
+
+@compiled_fused
 def evidences_of(
     products: FloatArray, seen: FloatArray, energy: float, count: int, known: Known
 ) -> FloatArray:
@@ -82,26 +108,11 @@ def evidences_of(
         count: n, rows.
         known: the priors.
     """
-    size, lines = known.precisions.shape[1], known.waves.shape[1]
     out = np.empty(len(known.precisions))
     for k in range(len(out)):
-        factor, right = products.copy(), seen.copy()
-        for w in range(lines):
-            factor[1 + w, 1 + w] += known.waves[k, w]
-        for begin in range(1 + lines, len(factor), size):
-            add_block(factor[begin : begin + size, begin : begin + size], known.precisions[k])
-        if known.at >= 0:
-            end = known.at + size
-            add_block(factor[known.at : end, known.at : end], known.held[k])
-            for i in range(size):
-                right[known.at + i] += known.pulls[k, i]
+        factor, right = beside_prior(products, seen, known, k)
         determinant = factorised(factor)
-        explained = 0.0
-        for i in range(len(right)):
-            for j in range(i):
-                right[i] -= factor[i, j] * right[j]
-            right[i] /= factor[i, i]
-            explained += right[i] * right[i]
+        explained = explained_by(factor, right)
         left = max(energy + known.energies[k] - explained, LEAST * energy)
         out[k] = count * np.log(left / count) + determinant
     return out
@@ -171,10 +182,8 @@ class Given(NamedTuple):
 
 
 @compiled_fused
-def evidence(
-    stem: FloatArray, moves: Moves, given: Given, precision: FloatArray
-) -> tuple[float, FloatArray]:
-    r"""Return −2 log of the marginal likelihood but for constants, and the response.
+def _evidence(stem: FloatArray, moves: Moves, given: Given, precision: FloatArray) -> float:
+    r"""Return −2 log of the marginal likelihood but for constants.
 
     .. math:: n \log(r / n) + \log\det(X X^T + K^{-1})
 
@@ -207,19 +216,18 @@ def evidence(
     gram += precision
     determinant = factorised(gram)
     seen = grouped(lag_products(moves, given.target, taps), edges) + given.pull
-    response, explained = solved(gram, seen)
-    left = max(given.energy - explained, LEAST * given.energy)
-    return count * np.log(left / count) + determinant, response
+    left = max(given.energy - explained_by(gram, seen), LEAST * given.energy)
+    return float(count * np.log(left / count) + determinant)
 
 
 @compiled_fused
 def evidences(
     stems: FloatArray, given: Given, precision: FloatArray, least_moves: int
 ) -> FloatArray:
-    """Return :func:`evidence` of many stems, shape (G, N); infinite where one moves less often."""
+    """Return the evidence of many stems, shape (G, N); infinite where one moves less often."""
     out = np.full(len(stems), np.inf)
     for g in range(len(stems)):
         moves = moves_of(stems[g])
         if len(moves.at) >= least_moves:
-            out[g] = evidence(stems[g], moves, given, precision)[0]
+            out[g] = _evidence(stems[g], moves, given, precision)
     return out

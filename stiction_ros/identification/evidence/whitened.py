@@ -14,6 +14,7 @@ from stiction_ros.identification.evidence.fit_kernels import (
     Known,
     Lines,
     beside_lines,
+    beside_prior,
     evidences,
     evidences_of,
     factorised,
@@ -135,27 +136,31 @@ class Whitened:
         size = len(self.edges) - 1
         return slice(len(self.known.rows) + valve * size, len(self.known.rows) + (valve + 1) * size)
 
+    def before(self, priors: Sequence[ResponsePrior]) -> Known:
+        """Return what is known before the record, under each of several priors, one at least."""
+        size, count = len(self.edges) - 1, len(priors)
+        helds = [self.held(prior) for prior in priors] if self.at >= 0 else []
+        told = [held for held in helds if held is not None]
+        waves = np.empty((count, len(self.known.rows) - 1))
+        if len(self.passed):  # few records have any, and this is called tens of thousands of times
+            waves[:] = [1.0 / self.wave_variances(prior) for prior in priors]
+        return Known(
+            precisions=np.array([prior.precision(self.edges) for prior in priors]),
+            waves=waves,
+            held=np.array([held.precision for held in told]).reshape(-1, size, size),
+            pulls=np.array([held.pull for held in told]).reshape(-1, size),
+            energies=np.array([held.energy for held in told]) if told else np.zeros(count),
+            at=self.block(self.at).start if told else -1,
+        )
+
     def equations(self, prior: ResponsePrior) -> tuple[FloatArray, FloatArray, float]:
         """Return what is known before the record with the products, those with y, and y's energy.
 
         Shapes (q, q) and (q,).
         """
-        seen, energy = self.seen_products, energy_of(self.seen)
-        out, precision = self.products.copy(), prior.precision(self.edges)
-        if len(self.known.rows) > 1:
-            waves = np.arange(1, len(self.known.rows))
-            out[waves, waves] += 1.0 / self.wave_variances(prior)
-        for start in range(len(self.known.rows), len(out), len(precision)):
-            block = slice(start, start + len(precision))
-            out[block, block] += precision
-        held = self.held(prior) if self.at >= 0 else None
-        if held is not None:
-            block = self.block(self.at)
-            seen = seen.copy()
-            out[block, block] += held.precision
-            seen[block] += held.pull
-            energy += held.energy
-        return out, seen, energy
+        known = self.before([prior])
+        out, seen = beside_prior(self.products, self.seen_products, known, 0)
+        return out, seen, energy_of(self.seen) + float(known.energies[0])
 
     def log_determinant(self, prior: ResponsePrior) -> float:
         """Return log det of the prior covariance of everything but the constant."""
@@ -175,21 +180,7 @@ class Whitened:
 
     def losses(self, priors: Sequence[ResponsePrior]) -> FloatArray:
         """Return the loss of each of several priors, one at least, shape (K,)."""
-        size, count = len(self.edges) - 1, len(priors)
-        helds = [self.held(prior) for prior in priors] if self.at >= 0 else []
-        told = [held for held in helds if held is not None]
-        waves = np.empty((count, len(self.known.rows) - 1))
-        if len(self.passed):  # few records have any, and this is called tens of thousands of times
-            waves[:] = [1.0 / self.wave_variances(prior) for prior in priors]
-        known = Known(
-            precisions=np.array([prior.precision(self.edges) for prior in priors]),
-            waves=waves,
-            held=np.array([held.precision for held in told]).reshape(-1, size, size),
-            pulls=np.array([held.pull for held in told]).reshape(-1, size),
-            energies=np.array([held.energy for held in told]) if told else np.zeros(count),
-            at=self.block(self.at).start if told else -1,
-        )
-        energy = energy_of(self.seen)
+        energy, known = energy_of(self.seen), self.before(priors)
         found = evidences_of(self.products, self.seen_products, energy, len(self.seen), known)
         return np.asarray(found + [self.log_determinant(prior) for prior in priors])
 
