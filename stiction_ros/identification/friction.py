@@ -24,6 +24,7 @@ from stiction_ros.effects import (
 )
 from stiction_ros.errors import InputError
 
+BEGINNINGS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)  # of a stem, shares of f_S away from OP
 TURN = 0.1  # of the span of OP: less is no turn
 Judge = Callable[[FloatArray], FloatArray]
 """The loss of rows (f_S, f_D, further parameters …, start), shape (G, 3 + n), as shape (G,)."""
@@ -125,6 +126,13 @@ def finer_grid(centres: FloatArray, step: float, limit: float, half: int = 3) ->
     dynamic = np.clip(rows[:, 1], 0.0, static)
     grid = _without_repetition(np.column_stack([static, dynamic]))
     return np.asarray(grid[grid[:, 0] > 0.0])
+
+
+def with_beginnings(grid: FloatArray, away: FloatArray) -> FloatArray:
+    """Return rows (f_S, f_D, start): ``grid`` from OP, ``away`` from each of the other places."""
+    rows = [np.column_stack([grid, np.zeros(len(grid))])]
+    rows += [np.column_stack([away, share * away[:, 0]]) for share in BEGINNINGS]
+    return np.vstack(rows)
 
 
 def behaviour_of(

@@ -14,7 +14,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import Candidate, Judge, rows_apart
 from stiction_ros.identification.evidence.fit_problem import LIMIT, Problem
 from stiction_ros.identification.evidence.output_fit import OutputFit
-from stiction_ros.identification.friction import TURN, even_grid, samples_of_turns
+from stiction_ros.identification.friction import TURN, even_grid, samples_of_turns, with_beginnings
 
 TURNS = 6  # of OP in the first beginning
 LEAST = 100  # rows of it
@@ -32,11 +32,7 @@ round a friction."""
 
 
 def grown(
-    problem: Problem,
-    base: Candidate,
-    valve: int,
-    fits: Sequence[OutputFit],
-    beginnings: Sequence[float],
+    problem: Problem, base: Candidate, valve: int, fits: Sequence[OutputFit]
 ) -> tuple[FloatArray, FloatArray]:
     """Return what was held against the whole record, and its loss.
 
@@ -45,16 +41,13 @@ def grown(
         base: whose other valves are kept.
         valve: index.
         fits: whose noise and prior are taken.
-        beginnings: of the stem away from OP that are tried, shares of f_S.
 
     Returns:
         Rows (f_S, f_D, start), shape (G, 3), and losses, shape (G,).
     """
     step, count = LIMIT / STEPS, min(_first(problem, valve), problem.rows)
     grid = even_grid(LIMIT, STEPS)
-    rows = [np.column_stack([grid, np.zeros(len(grid))])]
-    rows += [np.column_stack([grid[::AWAY], share * grid[::AWAY, 0]]) for share in beginnings]
-    tried = np.vstack(rows)
+    tried = with_beginnings(grid, grid[::AWAY])
     over: list[FloatArray] = []
     while True:
         part, whole = problem.beginning(count), count == problem.rows

@@ -27,7 +27,12 @@ from stiction_ros.identification.evidence.output_fit import (
     follow,
     white,
 )
-from stiction_ros.identification.friction import coarse_grid, cross_grid, finer_grid
+from stiction_ros.identification.friction import (
+    coarse_grid,
+    cross_grid,
+    finer_grid,
+    with_beginnings,
+)
 
 SEEDS = 6  # frictions taken from one look at the whole triangle
 APART = 0.03  # of the span of OP, by which they differ
@@ -41,8 +46,7 @@ STEP = 0.03  # of the span: first step of the polish
 FINEST = 1e-4
 SHRINK = 2.5
 LINES = 100  # steps along J and S over the span
-BEGINNINGS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)  # of a stem, shares of f_S away from OP
-THINNED = 3  # rows of the grid of which one is tried with these
+THINNED = 3  # rows of the grid of which one is tried with other beginnings
 STARTS = 41  # beginnings of a head
 OFF = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])  # steps of a beginning, with those of friction
 GAIN = 10.0  # of the loss: a friction that gains less is none to search another valve's beside
@@ -122,15 +126,11 @@ class _Valve:
     def look(self, fits: Sequence[OutputFit]) -> None:
         """Take the best of the whole triangle under the noise of ``fits``."""
         grid = coarse_grid(LIMIT)
-        rows = [np.column_stack([grid, np.zeros(len(grid))])]
-        for share in BEGINNINGS:
-            away = grid[::THINNED]
-            rows.append(np.column_stack([away, share * away[:, 0]]))
-        self._take(np.vstack(rows), fits, SEEDS, APART)
+        self._take(with_beginnings(grid, grid[::THINNED]), fits, SEEDS, APART)
 
     def grow(self, fits: Sequence[OutputFit]) -> None:
         """Take the best of what is found on growing beginnings of the record."""
-        rows, found = grown(self.problem, self.base, self.valve, fits, BEGINNINGS)
+        rows, found = grown(self.problem, self.base, self.valve, fits)
         for i in rows_apart(rows[:, :2], found, SEEDS, APART):
             self.add(rows[i], fits, whole=False)
 
