@@ -37,10 +37,9 @@ class StepAnswer:
             samples: of the record.
             sample_time: s.
         """
-        wait = model.delay[valve] + 1
-        count = max(samples // 2, wait + 2)
+        count = max(samples // 2, model.delay[valve] + 3)
         values = step_response(model.a, model.b[valve], model.delay[valve], count)
-        return cls._of(model.name, values, wait, model.noise_std, sample_time)
+        return cls.of_values(model.name, values, model.noise_std, sample_time)
 
     @classmethod
     def of_values(
@@ -55,12 +54,6 @@ class StepAnswer:
             sample_time: s.
         """
         wait = int(np.argmax(values != 0.0))
-        return cls._of(output, values, wait, noise, sample_time)
-
-    @classmethod
-    def _of(
-        cls, output: str, values: FloatArray, wait: int, noise: float, sample_time: float
-    ) -> "StepAnswer":
         reached, before = (np.abs(part).max() for part in (values, values[: len(values) // 2 + 1]))
         lag = None
         if reached <= GROWS * before:
