@@ -12,7 +12,7 @@ from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.conclusion import conclude, evidence, is_deadband, judge
 from stiction_ros.identification.exact.intervals import friction_intervals
 from stiction_ros.identification.exact.neighbourhood import REJECTED, refine
-from stiction_ros.identification.exact.search import SearchOutcome, comb, improve, search
+from stiction_ros.identification.exact.search import comb, improve, search
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.problem.models import (
     Data,
@@ -23,7 +23,6 @@ from stiction_ros.identification.problem.models import (
     settle_delays,
     stem_of,
 )
-from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import liveliest_part, prepare, windows
 from stiction_ros.identification.result import (
     Identification,
@@ -62,29 +61,24 @@ def identify_exact(
     report(0.02)
     require_cells(data.law)
     part = liveliest_part(data)
-    orders, linear, outcome, table = choose(part, options)
+    linear, found, pairs, table = choose(part, options)
     report(0.4)
     if part is not data:
-        linear = linear_model(data, orders)
-    model = carried_over(data, linear, outcome.model, orders)
+        linear = linear_model(data, linear.orders)
+    model = carried_over(data, linear, found)
     report(0.5)
-    model, delays = settle_delays(data, model, orders)
-    valves, final = judged_valves(record, data, model, linear, orders, options)
+    model, delays = settle_delays(data, model)
+    valves, final = judged_valves(record, data, model, linear, options)
     report(1.0)
     exact = [certificate(valve) for valve in valves if valve.static_friction > 0.0]
-    told = (*ambiguities(record, delays, outcome.rivals), *exact)
+    told = (*ambiguities(record, delays, pairs), *exact)
     plain = conclude(record, data, final, valves, table, told)
     answer = explained(record, plain, close_loop(record, plain))
     return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
 
 
 def judged_valves(
-    record: Record,
-    data: Data,
-    model: Model,
-    linear: Model,
-    orders: Orders,
-    options: IdentificationOptions,
+    record: Record, data: Data, model: Model, linear: Model, options: IdentificationOptions
 ) -> tuple[tuple[ValveEstimate, ...], Model]:
     """Return the estimates and the final model, judged against the friction-free rivals.
 
@@ -92,12 +86,12 @@ def judged_valves(
     rivals; those of another begin where the one before ends.
     """
     rivals, first = at_once(
-        lambda: [linear_rivals(data, model, linear, orders, j) for j in range(len(data.u))],
-        lambda: friction_intervals(data, model, orders, 0, options.confidence),
+        lambda: [linear_rivals(data, model, linear, j) for j in range(len(data.u))],
+        lambda: friction_intervals(data, model, 0, options.confidence),
     )
     valves = []
     for j in range(len(data.u)):
-        intervals = friction_intervals(data, model, orders, j, options.confidence) if j else first
+        intervals = friction_intervals(data, model, j, options.confidence) if j else first
         model = intervals.model
         span = float(np.ptp(data.u[j]))
         figures = evidence(model, rivals[j], j, span)
@@ -110,7 +104,7 @@ def judged_valves(
         f_s, f_d = intervals.static_estimate, intervals.dynamic_estimate
         if doubted and (figures["delta_bic"] < 0.0 or healthy):
             f_s = f_d = 0.0
-            model = without_friction(data, model, orders, j)
+            model = without_friction(data, model, j)
         if record.stem is not None:
             error = model.stems[j] + record.op[:, j].mean() - record.stem[:, j]
             figures["stem_error"] = float(np.mean(error**2))
@@ -136,7 +130,7 @@ def judged_valves(
     return tuple(valves), model
 
 
-def carried_over(data: Data, linear: Model, found: Model, orders: Orders) -> Model:
+def carried_over(data: Data, linear: Model, found: Model) -> Model:
     """Return the best model of the whole record near the friction found in a part of it.
 
     Args:
@@ -154,38 +148,38 @@ def carried_over(data: Data, linear: Model, found: Model, orders: Orders) -> Mod
         stems=stems,
         delays=found.delays,
     )
-    model = refit(data, model, orders, warm=False)
+    model = refit(data, model, linear.orders, warm=False)
     for j in sticky:
-        model = comb(data, model, orders, j)
-        model, _ = refine(data, model, orders, j, REJECTED)
+        model = comb(data, model, j)
+        model, _ = refine(data, model, j, REJECTED)
     return min(linear, model, key=lambda candidate: candidate.loss)
 
 
 def choose(
     data: Data, options: IdentificationOptions
-) -> tuple[Orders, Model, SearchOutcome, tuple[OrderRow, ...]]:
-    """Return orders, the models without and with friction, and all orders tried."""
+) -> tuple[Model, Model, tuple[tuple[int, int], ...], tuple[OrderRow, ...]]:
+    """Return the models without and with friction, valves that do as well, and all orders tried."""
     orders_list = windows(options)
     start = orders_list[len(orders_list) // 2]
     linear = linear_model(data, start)
-    found = search(data, linear, start)
+    found, pairs = search(data, linear)
     if len(orders_list) == 1:
-        return start, linear, found, (order_row(start, found.model),)
-    models = together(*(partial(linear_model, data, n, found.model) for n in orders_list))
-    rivals = list(zip(orders_list, models, strict=True))
-    table = tuple(order_row(*rival) for rival in rivals)
-    orders, best = min(rivals, key=lambda rival: rival[1].bic)
-    if orders != start:
-        linear = linear_model(data, orders)
-        found = search(data, linear, orders, growing=False)
-        best = improve(data, best, orders)
-    better = min(best, found.model, key=lambda candidate: candidate.loss)
-    return orders, linear, dataclasses.replace(found, model=better), table
+        return linear, found, pairs, (order_row(found),)
+    models = together(*(partial(linear_model, data, n, found) for n in orders_list))
+    best = min(models, key=lambda rival: rival.bic)
+    if best.orders != start:
+        linear = linear_model(data, best.orders)
+        found, pairs = search(data, linear, growing=False)
+        best = improve(data, best)
+    better = min(best, found, key=lambda candidate: candidate.loss)
+    table = tuple(order_row(rival) for rival in models)
+    return linear, better, pairs, table
 
 
-def order_row(orders: Orders, model: Model) -> OrderRow:
+def order_row(model: Model) -> OrderRow:
     """Return the criteria of a model by which orders are compared."""
     parameters = sum(fit.parameters for fit in model.fits)
+    orders = model.orders
     return OrderRow(orders.output, orders.input, model.loss + 2.0 * parameters, model.bic)
 
 
@@ -220,31 +214,26 @@ def certificate(valve: ValveEstimate) -> str:
     return f"{head}: {patterns} switching patterns enumerated round it; {reach}"
 
 
-def linear_rivals(
-    data: Data, model: Model, linear: Model, orders: Orders, valve: int
-) -> list[Model]:
+def linear_rivals(data: Data, model: Model, linear: Model, valve: int) -> list[Model]:
     """Return models without friction in ``valve``, of three orders, with their own delays."""
     if model.friction[valve, 0] == 0.0:
         return [model]
-    freed = without_friction(data, model, orders, valve)
+    freed = without_friction(data, model, valve)
     own = dataclasses.replace(freed, delays=linear.delays)
 
     def of_order(extra: int) -> Model:
+        orders = model.orders
         raised = dataclasses.replace(
             orders, output=orders.output + extra, input=orders.input + extra
         )
-        known = raised == linear.fits[0].orders and not freed.friction.any()
+        known = raised == linear.orders and not freed.friction.any()
         return linear if known else refit(data, own, raised, warm=False)
 
     rivals = [freed, *together(*(partial(of_order, extra) for extra in (2, 1, 0)))]
     best = min(rivals, key=lambda rival: rival.bic)
-    return [*rivals, improve_delays(data, best, best.fits[0].orders)]
+    return [*rivals, improve_delays(data, best)]
 
 
-def without_friction(data: Data, model: Model, orders: Orders, valve: int) -> Model:
+def without_friction(data: Data, model: Model, valve: int) -> Model:
     """Return the model, fitted again, with a valve that follows OP."""
-    friction, start, stems = model.friction.copy(), model.start.copy(), model.stems.copy()
-    friction[valve], start[valve], stems[valve] = 0.0, 0.0, data.u[valve]
-    return refit(
-        data, dataclasses.replace(model, friction=friction, start=start, stems=stems), orders
-    )
+    return refit(data, model.with_stem(valve, data.u[valve], 0.0, 0.0), model.orders)

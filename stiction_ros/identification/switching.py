@@ -18,13 +18,12 @@ starts either at a given level, and then slips as (4) says, or its first slip is
 
 import dataclasses
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from stiction_ros.effects import FrictionLaw, HeStiction
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.effects.friction.moving_rules import MovingRules
+from stiction_ros.effects.friction.moving_rules import FollowingRules, MovingRules
 from stiction_ros.errors import InputError
 from stiction_ros.identification.friction import first_values, simulate
 from stiction_ros.identification.kernels.step import dense_steps, he_pattern_steps, he_steps
@@ -66,12 +65,6 @@ class StepSignals:
             np.concatenate([part.values for part in parts]),
         )
 
-    def part(self, begin: int, end: int) -> "StepSignals":
-        """Return the signals from ``begin`` to before ``end``."""
-        rows = slice(self.offsets[begin], self.offsets[end])
-        offsets = self.offsets[begin : end + 1] - self.offsets[begin]
-        return StepSignals(self.count, offsets, self.places[rows], self.values[rows])
-
     def chosen(self, signals: IntArray) -> "StepSignals":
         """Return some of the signals, by their indices."""
         lengths = np.diff(self.offsets)[signals]
@@ -96,15 +89,11 @@ class StepSignals:
 
 
 def stem_steps(
-    law: type[FrictionLaw],
-    grid: FloatArray,
-    u: FloatArray,
-    start: FloatArray | float,
-    further: Sequence[float] = (),
+    law: type[FrictionLaw], grid: FloatArray, u: FloatArray, start: FloatArray | float
 ) -> StepSignals:
     """Return stems for rows (f_S, f_D) and OP u, shape (N,), as :func:`simulate` does."""
     if law is not HeStiction:
-        return StepSignals.of(simulate(law, grid, u, start, further))
+        return StepSignals.of(simulate(law, grid, u, start))
     starts = np.broadcast_to(np.asarray(start, dtype=float), (len(grid),)).copy()
     static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
     return StepSignals(len(u), *he_steps(static, dynamic, u, starts))
@@ -212,36 +201,26 @@ def require_cells(law: type[FrictionLaw]) -> None:
         )
 
 
-def moving_rules(law: type[FrictionLaw], u: FloatArray) -> MovingRules | None:
-    """Return how a valve with a moving state follows OP u, (N,); None for other laws."""
-    return law.switching(u) if isinstance(law.switching, type) else None
+def slip_rules(law: type[FrictionLaw], u: FloatArray) -> MovingRules:
+    """Return how a valve leaves its rest under OP u, (N,); under He's law as under Kano's."""
+    return law.switching(u) if isinstance(law.switching, type) else FollowingRules(u)
 
 
 def beginning_of(
     u: FloatArray, level: float, static: float, law: type[FrictionLaw] = HeStiction
 ) -> Beginning:
     """Return the beginning of a valve that rests at ``level`` with static friction f_S."""
-    rules = moving_rules(law, u)
-    if rules is not None:
-        return Beginning(level, *rules.first_slip(level, static))
-    error = u - level
-    slips = np.flatnonzero(np.abs(error) > static)
-    if not len(slips):
-        return Beginning(level, len(u), 0.0)
-    return Beginning(level, int(slips[0]), float(np.sign(error[slips[0]])))
+    return Beginning(level, *slip_rules(law, u).first_slip(level, static))
 
 
 def first_slip_range(
     u: FloatArray, level: float, begin: Beginning, law: type[FrictionLaw] = HeStiction
 ) -> tuple[float, float]:
     """Return the f_S, %, with which a valve that rests at ``level`` first slips as it did."""
-    rules = moving_rules(law, u)
-    if rules is not None:
-        may = rules.resting_samples(level)
-        lead = np.where(may, np.abs(u - level), 0.0)
-        return float(lead[: begin.first].max(initial=0.0)), float(lead[begin.first])
-    least = float(np.abs(u[: begin.first] - level).max(initial=0.0))
-    return least, float(begin.direction * (u[begin.first] - level))
+    rules = slip_rules(law, u)
+    lead = np.where(rules.resting_samples(level), np.abs(u - level), 0.0)
+    so = rules.direction(begin.first, level) == begin.direction
+    return float(lead[: begin.first].max(initial=0.0)), float(lead[begin.first]) if so else 0.0
 
 
 def levels_of(
@@ -252,10 +231,8 @@ def levels_of(
     The ranges tile u_0 ± f_S; inside each the first slip is the same. When there are more
     than ``most``, the widest are returned.
     """
-    rules = moving_rules(law, u)
-    if rules is not None:
-        may = rules.resting_samples(float(u[0]))
-        u = u[may] if may.any() else u
+    may = slip_rules(law, u).resting_samples(float(u[0]))
+    u = u[may] if may.any() else u
     edges = [float(u[0]) - static, float(u[0]) + static]
     highs = np.unique(np.maximum.accumulate(u)) - static
     lows = np.unique(np.minimum.accumulate(u)) + static
@@ -274,10 +251,8 @@ def levels_with(
     Returns:
         Shape (1, 2), or (0, 2) when there is no such level.
     """
-    before = u[: begin.first]
-    rules = moving_rules(law, u)
-    if rules is not None:
-        before = before[rules.resting_samples(float(u[0]))[: begin.first]]
+    may = slip_rules(law, u).resting_samples(float(u[0]))[: begin.first]
+    before = u[: begin.first][may]
     if not len(before):
         return np.empty((0, 2))
     low, high = float(before.max()) - static, float(before.min()) + static
@@ -290,15 +265,16 @@ def cells_at(
     u: FloatArray, begin: Beginning, points: FloatArray, law: type[FrictionLaw] = HeStiction
 ) -> Cells:
     """Return the cells that hold the points (J, S), shape (G, 2), behind a given first slip."""
-    rules = moving_rules(law, u)
-    if rules is not None:
-        first = (begin.first, begin.direction)
-        return _moving_cells(rules, points, np.full(len(points), begin.level), first)
-    return _cells(u, points, np.full(len(points), begin.level), begin)
+    levels = np.full(len(points), begin.level)
+    return resting_cells(u, levels, points, law, (begin.first, begin.direction))
 
 
 def resting_cells(
-    u: FloatArray, levels: FloatArray, points: FloatArray, law: type[FrictionLaw] = HeStiction
+    u: FloatArray,
+    levels: FloatArray,
+    points: FloatArray,
+    law: type[FrictionLaw] = HeStiction,
+    first: tuple[int, float] | None = None,
 ) -> Cells:
     """Return the cells of the points (J, S), shape (G, 2), of valves that rest at ``levels``.
 
@@ -306,32 +282,18 @@ def resting_cells(
 
     Args:
         levels: stem position before the first sample, %, shape (G,).
+        first: sample and direction of the first slip; None lets f_S decide.
     """
-    rules = moving_rules(law, u)
-    if rules is not None:
-        return _moving_cells(rules, points, levels, None)
-    return _cells(u, points, np.asarray(levels, dtype=float), None)
-
-
-def _moving_cells(
-    rules: MovingRules, points: FloatArray, levels: FloatArray, first: tuple[int, float] | None
-) -> Cells:
-    u = rules.u
-    traces = [
-        rules.trace(point, level, first)
-        for point, level in zip(points.tolist(), levels.tolist(), strict=True)
-    ]
+    if not isinstance(law.switching, type):
+        jump, reverse = np.ascontiguousarray(points.T)
+        found = he_pattern_steps(u, jump, reverse, levels, *(first or (-1, 0.0)))
+        offsets, places, values, bounds = found
+        return Cells(bounds, StepSignals(len(u), offsets, places, values))
+    rules = law.switching(u)
+    traces = [rules.trace(*at, first) for at in zip(points.tolist(), levels.tolist(), strict=True)]
     bases, signs = (
         np.array([getattr(trace, name) for trace in traces]).reshape(-1, len(u)).T
         for name in ("base", "sign")
     )
     bounds = np.array([trace.bounds for trace in traces]).reshape(-1, 4)
     return Cells(bounds, StepSignals.of(bases, signs))
-
-
-def _cells(u: FloatArray, points: FloatArray, level: FloatArray, begin: Beginning | None) -> Cells:
-    jump, reverse = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
-    first, direction = (-1, 0.0) if begin is None else (begin.first, begin.direction)
-    found = he_pattern_steps(u, jump, reverse, level, first, direction)
-    offsets, places, values, bounds = found
-    return Cells(bounds, StepSignals(len(u), offsets, places, values))

@@ -30,7 +30,7 @@ from stiction_ros.identification.evidence.rates import (
     looks,
 )
 from stiction_ros.identification.evidence.sensor_hold import hold_notes
-from stiction_ros.identification.friction import find_law
+from stiction_ros.identification.friction import find_law, simulate
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.judgement import Figures, friction_probability, verdict_of
 from stiction_ros.identification.problem.models import (
@@ -39,7 +39,6 @@ from stiction_ros.identification.problem.models import (
     linear_model,
     refit,
     settle_delays,
-    stem_of,
 )
 from stiction_ros.identification.problem.preparation import prepare, windows
 from stiction_ros.identification.result import (
@@ -231,7 +230,7 @@ def _over_all(
     )
     nowhere = np.zeros(len(valves))
     model = dataclasses.replace(found, start=nowhere, stems=_stems(data, valves, nowhere))
-    return valves, refit(data, model, found.fits[0].orders, warm=False)
+    return valves, refit(data, model, found.orders, warm=False)
 
 
 def _stems(data: Data, valves: tuple[ValveEstimate, ...], starts: FloatArray) -> FloatArray:
@@ -239,10 +238,10 @@ def _stems(data: Data, valves: tuple[ValveEstimate, ...], starts: FloatArray) ->
     stems = data.u.copy()
     for j, valve in enumerate(valves):
         if valve.static_friction > 0.0:
-            further = (valve.further_values,) * len(stems)
-            own = dataclasses.replace(data, law=find_law(valve.law), further=further)
-            friction = np.array([valve.static_friction, valve.dynamic_friction])
-            stems[j] = stem_of(own, j, friction, float(starts[j]))
+            law, op = find_law(valve.law), data.u[j]
+            friction = np.array([[valve.static_friction, valve.dynamic_friction]])
+            further = valve.further_values
+            stems[j] = simulate(law, friction, op, float(op[0] + starts[j]), further)[:, 0]
     return stems
 
 
@@ -255,7 +254,6 @@ def _process(
     stems = _stems(data, valves, starts)
     delays = ((data.delay[0],) * len(valves),) * len(data.y)
     base = Model(friction, starts, stems, delays, ())
-    rivals = [(orders, linear_model(data, orders, base)) for orders in windows(options)]
-    orders, best = min(rivals, key=lambda rival: rival[1].bic)
-    model, _ = settle_delays(data, best, orders)
-    return model, tuple(order_row(*rival) for rival in rivals)
+    rivals = [linear_model(data, orders, base) for orders in windows(options)]
+    model, _ = settle_delays(data, min(rivals, key=lambda rival: rival.bic))
+    return model, tuple(order_row(rival) for rival in rivals)

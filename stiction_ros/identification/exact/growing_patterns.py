@@ -48,19 +48,18 @@ class Branch:
     scan: PatternScan  # the cells
 
 
-def growing_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Model:
+def growing_patterns(data: Data, model: Model, valve: int) -> Model:
     """Return the best model found on growing windows, or ``model`` if none is better.
 
     Args:
         model: gives the stems of the other valves.
     """
     apart = BIN * float(data.limit[valve])
-    lengths = window_lengths(first_window(data, orders, valve), data.y.shape[1])
+    lengths = window_lengths(first_window(data, model.orders, valve), data.y.shape[1])
 
     def search(begin: Beginning, count: int) -> PatternSearch:
         window, shown = data.part(0, count), model.beginning(count)
-        criterion = Criterion.ONE_STEP
-        return PatternSearch(window, shown, orders, valve, data.delays, begin, criterion)
+        return PatternSearch(window, shown, valve, begin=begin, criterion=Criterion.ONE_STEP)
 
     begins = first_slips(data.u[valve][: lengths[0]])
     if not begins:
@@ -68,7 +67,7 @@ def growing_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Mo
     kept = [first_branch(search(begin, lengths[0]), begin) for begin in begins]
     for count in lengths[1:]:
         kept = [divided(branch, search(branch.begin, count)) for branch in thinned(kept, apart)]
-    return _fitted(data, model, orders, valve, kept)
+    return _fitted(data, model, valve, kept)
 
 
 def first_window(data: Data, orders: Orders, valve: int) -> int:
@@ -172,7 +171,7 @@ def spread(scan: PatternScan, apart: float, count: int, alike: int) -> IntArray:
     return order[place - first_of_square < alike][:count]
 
 
-def _fitted(data: Data, model: Model, orders: Orders, valve: int, branches: list[Branch]) -> Model:
+def _fitted(data: Data, model: Model, valve: int, branches: list[Branch]) -> Model:
     """Return the best of the exact fits of the best cells and of ``model``."""
     cells = [
         (float(branch.scan.loss[i]), branch, int(i))
@@ -183,6 +182,6 @@ def _fitted(data: Data, model: Model, orders: Orders, valve: int, branches: list
     for _, branch, i in sorted(cells, key=lambda cell: cell[0])[:FITTED]:
         friction, start = branch.search.realised(branch.scan, i, branch.begin)
         delays = branch.scan.delays[i]
-        rival = with_valve(data, model, orders, valve, friction, start, delays, warm=False)
+        rival = with_valve(data, model, valve, friction, start, delays, warm=False)
         best = min(best, rival, key=lambda candidate: candidate.loss)
     return best

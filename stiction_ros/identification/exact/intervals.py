@@ -6,21 +6,9 @@ import numpy as np
 
 from stiction_ros.deferred import chi2_quantile
 from stiction_ros.identification.exact.neighbourhood import refine
-from stiction_ros.identification.exact.pattern_search import (
-    PatternSearch,
-    best_in_cells,
-    nearby_delays,
-    points_of,
-)
+from stiction_ros.identification.exact.pattern_search import PatternSearch, best_in_cells, points_of
 from stiction_ros.identification.friction import coarse_grid
-from stiction_ros.identification.problem.models import (
-    Data,
-    Model,
-    ValveScan,
-    scan_valve,
-    with_valve,
-)
-from stiction_ros.identification.problem.output_error import Orders
+from stiction_ros.identification.problem.models import Data, Model, ValveScan, with_valve
 from stiction_ros.identification.switching import PatternScan
 
 # f_S, f_D and one more for the choice among very many patterns.
@@ -49,20 +37,17 @@ class FrictionIntervals:
 
 
 def friction_intervals(
-    data: Data, model: Model, orders: Orders, valve: int, confidence: float
+    data: Data, model: Model, valve: int, confidence: float
 ) -> FrictionIntervals:
     """Return the intervals of one valve round the model's friction, at the model's delays."""
     limit = float(data.limit[valve])
     threshold = chi2_quantile(confidence, FREEDOM)
-    model, near = refine(data, model, orders, valve, threshold, wander=0)
-    scan = _far_patterns(data, model, orders, valve)
+    model, near = refine(data, model, valve, threshold, wander=0)
+    search = PatternSearch(data, model, valve, wander=0)
+    scan = _far_patterns(search, float(model.start[valve]))
     if near is not None:
         scan = PatternScan.joined([scan, near.scan])
-    start = float(model.start[valve])
-    ranges = nearby_delays(data, model, valve, 0)
-    zero = scan_valve(data, model, orders, valve, np.zeros((1, 2)), start, ranges=ranges)
-    scan = PatternScan.joined([point_patterns(zero), scan])
-    scan = _without_standstill(data, model, orders, valve, scan, threshold)
+    scan = _without_standstill(data, model, valve, scan, threshold)
     floor = float(scan.loss.min())
     accepted = np.flatnonzero(scan.loss <= floor + threshold).tolist()
     dynamics = [scan.accepted_dynamic(i, floor + threshold - float(scan.loss[i])) for i in accepted]
@@ -84,18 +69,18 @@ def friction_intervals(
     )
 
 
-def _far_patterns(data: Data, model: Model, orders: Orders, valve: int) -> PatternScan:
-    """Return the patterns of deadbands and of the best points of a coarse grid."""
-    limit, start = float(data.limit[valve]), float(model.start[valve])
-    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve, 0))
+def _far_patterns(search: PatternSearch, start: float) -> PatternScan:
+    """Return no friction, the patterns of deadbands and those of the best of a coarse grid."""
+    limit = search.limit
     coarse = search.scan(coarse_grid(limit), start)
     chosen = coarse.grid[np.argsort(coarse.loss, kind="stable")[:FAR]]
     deadbands = np.repeat(limit * (np.arange(1, 41) / 40.0) ** 2, 2).reshape(-1, 2)
-    return best_in_cells(search, np.vstack([chosen, deadbands]), start)[1]
+    cells = best_in_cells(search, np.vstack([chosen, deadbands]), start)[1]
+    return PatternScan.joined([point_patterns(search.scan(np.zeros((1, 2)), start)), cells])
 
 
 def _without_standstill(
-    data: Data, model: Model, orders: Orders, valve: int, scan: PatternScan, threshold: float
+    data: Data, model: Model, valve: int, scan: PatternScan, threshold: float
 ) -> PatternScan:
     """Drop patterns in which the stem hardly moves unless the record does not reject them.
 
@@ -110,7 +95,6 @@ def _without_standstill(
     exact = with_valve(
         data,
         model,
-        orders,
         valve,
         np.array(scan.middle(index, float(data.limit[valve]))),
         float(model.start[valve]),

@@ -12,13 +12,11 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.exact.pattern_search import (
     PatternSearch,
-    nearby_delays,
     overlapping,
     points_of,
     remainders,
 )
 from stiction_ros.identification.problem.models import Data, Model, with_valve
-from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.switching import (
     Beginning,
     Cells,
@@ -119,7 +117,7 @@ def _grown(scan: PatternScan, rectangle: FloatArray, threshold: float, limit: fl
 
 
 def refine(
-    data: Data, model: Model, orders: Orders, valve: int, threshold: float, wander: int = 1
+    data: Data, model: Model, valve: int, threshold: float, wander: int = 1
 ) -> tuple[Model, PatternMap | None]:
     """Return the model with the best pattern of its neighbourhood, and that neighbourhood.
 
@@ -134,13 +132,12 @@ def refine(
     for _ in range(NEIGHBOURHOOD_ROUNDS):
         if model.friction[valve, 0] <= 0.0:
             return model, None
-        ranges = nearby_delays(data, model, valve, wander)
-        plain = PatternSearch(data, model, orders, valve, ranges)
+        plain = PatternSearch(data, model, valve, wander)
         level = plain.best_level(model.friction[valve])
         begin = beginning_of(plain.u, level, float(model.friction[valve, 0]), data.law)
         if begin.first == len(plain.u):
             return model, None
-        search = PatternSearch(data, model, orders, valve, ranges, begin)
+        search = PatternSearch(data, model, valve, wander, begin)
         most = min(MOST_CELLS, int(CELL_SAMPLES / len(plain.u)))
         before = reachable if reachable is not None and reachable.closed else None
         reachable = neighbourhood(
@@ -152,7 +149,7 @@ def refine(
         if not np.isfinite(loss[best]):
             break
         friction, start = plain.realised(found, best, begin)
-        rival = with_valve(data, model, orders, valve, friction, start, found.delays[best])
+        rival = with_valve(data, model, valve, friction, start, found.delays[best])
         if rival.loss > model.loss - LEAST_GAIN:
             break
         model = rival

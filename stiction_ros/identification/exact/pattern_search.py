@@ -15,16 +15,12 @@ from numpy.typing import NDArray
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.kernels.level import best_levels
 from stiction_ros.identification.problem.models import (
-    WORTHWHILE,
     Criterion,
     Data,
-    DelayRanges,
     Model,
     ValveScan,
     output_scans,
-    scan_stems,
 )
-from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.side_by_side import together
 from stiction_ros.identification.switching import (
     Beginning,
@@ -36,8 +32,11 @@ from stiction_ros.identification.switching import (
     levels_of,
     levels_with,
     resting_cells,
+    stem_steps,
 )
 
+BATCH = 500  # stems that are worked on together
+WORTHWHILE = 400_000  # samples of all stems or patterns, from which on two threads share them
 FEW = 60  # cells too few to tell how many there will be
 MOST_LEVELS = 30
 INSIDE = 1e-9  # of a range; how far from its edge
@@ -50,23 +49,51 @@ class PatternSearch:
         self,
         data: Data,
         model: Model,
-        orders: Orders,
         valve: int,
-        ranges: DelayRanges,
+        wander: int | None = None,
         begin: Beginning | None = None,
         criterion: Criterion = Criterion.INNOVATIONS,
     ) -> None:
-        """Build the criterion; with ``begin`` the stem before its first slip is left free."""
-        self.data, self.valve = data, valve
-        self.u, self.law = data.u[valve], data.law
+        """Build the criterion.
+
+        Args:
+            data, model: of which all but the friction of ``valve`` is kept.
+            valve: index.
+            wander: how many samples delays may lie beside those of the model; None for all.
+            begin: with it the stem before its first slip is left free.
+            criterion: filter by 1, 1/A or D/A of the model's fits.
+        """
+        self.u, self.law = np.ascontiguousarray(data.u[valve]), data.law
         free = None if begin is None else (np.arange(len(self.u)) < begin.first).astype(float)
         self.limit = float(data.limit[valve])
-        self.ranges, self.begin = ranges, begin
-        self.scans = output_scans(data, model, orders, valve, criterion, ranges, free)
+        self.ranges, self.begin = nearby_delays(data, model, valve, wander), begin
+        self.scans = output_scans(data, model, model.orders, valve, criterion, self.ranges, free)
 
     def scan(self, grid: FloatArray, starts: FloatArray | float) -> ValveScan:
-        """Scan rows (f_S, f_D), shape (G, 2), by the same criterion, see :func:`scan_valve`."""
-        return scan_stems(self.data, self.valve, grid, starts, self.scans, self.ranges)
+        """Scan rows (f_S, f_D), shape (G, 2).
+
+        Args:
+            grid: the rows.
+            starts: stem before the first sample minus first OP, %, shape (G,) or one for all.
+        """
+        starts = np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
+        begins = self.u[0] + starts
+        loss, moves = np.zeros(len(grid)), np.zeros(len(grid))
+        best = np.zeros((len(grid), len(self.scans)), dtype=int)
+
+        def scanned(rows: slice) -> None:
+            stems = stem_steps(self.law, grid[rows], self.u, begins[rows])
+            moves[rows] = stems.moves
+            for i, scan in enumerate(self.scans):
+                energy, delays = scan.least_energy(stems)
+                best[rows, i] = delays + self.ranges[i][0]
+                loss[rows] += scan.count * np.log(energy / scan.count)
+
+        shared = len(grid) * len(self.u) >= WORTHWHILE
+        batch = min(BATCH, (len(grid) + 1) // 2) if shared else BATCH
+        batches = (slice(at, at + batch) for at in range(0, len(grid), batch))
+        together(*(partial(scanned, rows) for rows in batches))
+        return ValveScan(grid, starts, loss, best, moves)
 
     def evaluate(self, cells: Cells) -> PatternScan:
         """Return the loss of every cell at its best f_D.
@@ -147,28 +174,24 @@ class PatternSearch:
         Returns:
             Best level (G,), second derivative (G,), loss (G,), delays (G, p).
         """
-        middle = patterns.size // 2
         if patterns.size * patterns.count < WORTHWHILE:
             return self._minimised_part(patterns, ranges)
-        one, two = together(
-            partial(self._minimised_part, patterns.part(0, middle), ranges[:middle]),
-            partial(self._minimised_part, patterns.part(middle, patterns.size), ranges[middle:]),
-        )
-        levels, second, loss, delays = map(np.concatenate, zip(one, two, strict=True))
+        halves = np.array_split(np.arange(patterns.size), 2)
+        parts = ((patterns.chosen(half), ranges[half]) for half in halves)
+        found = together(*(partial(self._minimised_part, *part) for part in parts))
+        levels, second, loss, delays = map(np.concatenate, zip(*found, strict=True))
         return levels, second, loss, delays
 
     def _minimised_part(
         self, patterns: StepSignals, ranges: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        energies = [scan.patterns(patterns) for scan in self.scans]
-        widest = max(energies, key=lambda energy: energy.delays)
-        products = np.zeros((patterns.size, len(energies), *widest.products.shape[1:]))
-        rights = np.zeros((patterns.size, len(energies), *widest.rights.shape[1:]))
-        scales = np.zeros((len(energies), 3))
-        for i, (scan, energy) in enumerate(zip(self.scans, energies, strict=True)):
-            lags = energy.rights.shape[2]
-            products[:, i, :, :, :lags], rights[:, i, :, :lags] = energy.products, energy.rights
-            scales[i] = scan.rest_energy, scan.count, energy.delays
+        found = [scan.products(patterns) for scan in self.scans]
+        width, lags = found[0][0].shape[2], max(own.shape[3] for own, _ in found)
+        products = np.zeros((patterns.size, len(found), 3, width, lags))
+        rights = np.zeros((patterns.size, len(found), 2, lags))
+        for i, (own, right) in enumerate(found):  # of the others there are fewer lags
+            products[..., : own.shape[3]][:, i], rights[..., : own.shape[3]][:, i] = own, right
+        scales = np.array([(scan.rest_energy, scan.count, scan.delays) for scan in self.scans])
         levels, second, loss, delays = best_levels(products, rights, scales, ranges)
         return levels, second, loss, delays + np.array([low for low, _ in self.ranges])
 
@@ -231,9 +254,12 @@ def points_of(friction: FloatArray) -> FloatArray:
     return np.column_stack([static - dynamic, static + dynamic])
 
 
-def nearby_delays(data: Data, model: Model, valve: int, wander: int = 1) -> DelayRanges:
+def nearby_delays(
+    data: Data, model: Model, valve: int, wander: int | None
+) -> tuple[tuple[int, int], ...]:
     """Return, per output, the delays of a valve within ``wander`` samples of the model's."""
     low, high = data.delay
+    wander = high - low if wander is None else wander
     now = [row[valve] for row in model.delays]
     return tuple((max(low, d - wander), min(high, d + wander)) for d in now)
 

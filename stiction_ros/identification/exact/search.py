@@ -8,7 +8,6 @@ the best switching pattern of its neighbourhood (:mod:`.pattern_search`).
 """
 
 import dataclasses
-import itertools
 from collections.abc import Callable, Mapping
 from functools import partial
 
@@ -18,23 +17,15 @@ from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.exact.growing_patterns import LONGEST, growing_patterns
 from stiction_ros.identification.exact.neighbourhood import REJECTED, SAMPLES, refine
-from stiction_ros.identification.exact.pattern_search import (
-    PatternSearch,
-    best_in_cells,
-    nearby_delays,
-    points_of,
+from stiction_ros.identification.exact.pattern_search import PatternSearch, best_in_cells, points_of
+from stiction_ros.identification.friction import (
+    BEGINNINGS,
+    coarse_grid,
+    cross_grid,
+    even_grid,
+    finer_grid,
 )
-from stiction_ros.identification.friction import coarse_grid, cross_grid, even_grid, finer_grid
-from stiction_ros.identification.problem.models import (
-    Criterion,
-    Data,
-    DelayRanges,
-    Model,
-    ValveScan,
-    scan_valve,
-    with_valve,
-)
-from stiction_ros.identification.problem.output_error import Orders
+from stiction_ros.identification.problem.models import Criterion, Data, Model, ValveScan, with_valve
 from stiction_ros.identification.side_by_side import together
 
 STEPS = 80
@@ -52,8 +43,7 @@ CROSS = 200
 LEAST_GAIN = 0.5
 ALIKE = 0.9
 EQUAL = 10.0
-BEGINNINGS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)  # of the stem, shares of f_S away from OP
-AWAY_STEPS = 30  # of their grids
+AWAY_STEPS = 30  # of the grids of stems that begin away from OP
 FURTHER = 2  # beginnings that are searched further
 
 
@@ -86,27 +76,22 @@ class FirstScan:
         return sorted(better, key=lambda other: float(other.loss.min()))[:FURTHER]
 
 
-def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstScan:
+def first_scan(data: Data, model: Model, valve: int) -> FirstScan:
     """Scan the whole triangle of one valve, its first row without friction."""
     limit, start = float(data.limit[valve]), float(model.start[valve])
-    fine = np.vstack([np.zeros((1, 2)), coarse_grid(limit), even_grid(limit, STEPS)])
+    coarse = np.vstack([np.zeros((1, 2)), coarse_grid(limit)])
+    fine = np.vstack([coarse, even_grid(limit, STEPS)])
     points = WORK / (data.y.shape[1] * len(BEGINNINGS))
     away = even_grid(limit, min(AWAY_STEPS, int(np.sqrt(points))))
-    starts = [np.full(len(fine), start), *(start + share * away[:, 0] for share in BEGINNINGS)]
-    grid = np.vstack([fine, *(away for _ in BEGINNINGS)])
-    everywhere = scan_valve(
-        data, model, orders, valve, grid, np.concatenate(starts), Criterion.ONE_STEP
-    )
-    ends = np.cumsum([len(part) for part in starts]).tolist()
-    elsewhere = tuple(everywhere.part(*rows) for rows in itertools.pairwise(ends))
-    coarse = np.vstack([np.zeros((1, 2)), coarse_grid(limit)])
-    scans = {Criterion.ONE_STEP: everywhere.part(0, len(fine))}
-    for criterion in (Criterion.FREE_RUN, Criterion.INNOVATIONS):
-        scans[criterion] = scan_valve(data, model, orders, valve, coarse, start, criterion)
+    by = {one: PatternSearch(data, model, valve, criterion=one) for one in Criterion}
+    one_step = by.pop(Criterion.ONE_STEP)
+    elsewhere = tuple(one_step.scan(away, start + share * away[:, 0]) for share in BEGINNINGS)
+    scans = {Criterion.ONE_STEP: one_step.scan(fine, start)}
+    scans |= {criterion: one.scan(coarse, start) for criterion, one in by.items()}
     return FirstScan(model, valve, scans, elsewhere)
 
 
-def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) -> Model:
+def first_search(data: Data, first: FirstScan, growing: bool) -> Model:
     """Return the best model over the whole triangle of one valve, never worse than before.
 
     Args:
@@ -115,7 +100,7 @@ def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) ->
     model, valve, limit = first.model, first.valve, float(data.limit[first.valve])
     piece_by_piece: list[Callable[[], Model]] = []
     if growing and data.law is HeStiction and data.y.shape[1] <= LONGEST:
-        piece_by_piece = [partial(growing_patterns, data, model, orders, valve)]
+        piece_by_piece = [partial(growing_patterns, data, model, valve)]
 
     def from_scan(scan: ValveScan, criterion: Criterion) -> Model:
         count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
@@ -125,18 +110,18 @@ def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) ->
         start = model.start.copy()
         start[valve] = scan.starts[chosen[0]]
         moved, parents = dataclasses.replace(model, start=start), scan.grid[chosen]
-        return descend(data, moved, orders, valve, parents, criterion, data.delays, False)
+        return descend(data, moved, valve, parents, criterion, None, False)
 
     rivals = together(
         *piece_by_piece,
         *(partial(from_scan, scan, criterion) for criterion, scan in first.scans.items()),
-        lambda: _from_fitted(data, first, orders),
+        lambda: _from_fitted(data, first),
         *(partial(from_scan, other, Criterion.ONE_STEP) for other in first.better_beginnings),
     )
     promising = sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]
     closer = together(
         *(
-            partial(comb, data, rival, orders, valve)
+            partial(comb, data, rival, valve)
             for rival in promising
             if rival.friction[valve, 0] > 0.0
         )
@@ -144,7 +129,7 @@ def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) ->
     return min([model, *closer], key=lambda candidate: candidate.loss)
 
 
-def _from_fitted(data: Data, first: FirstScan, orders: Orders) -> Model:
+def _from_fitted(data: Data, first: FirstScan) -> Model:
     """Search round the best points of the one-step scan with the noise of their own fits.
 
     Near a pattern that is narrow, the noise of a model without it hides it.
@@ -153,46 +138,43 @@ def _from_fitted(data: Data, first: FirstScan, orders: Orders) -> Model:
     apart = APART * float(data.limit[valve])
     start = float(model.start[valve])
     fitted = [
-        with_valve(data, model, orders, valve, scan.grid[i], start, scan.delays[i], warm=False)
+        with_valve(data, model, valve, scan.grid[i], start, scan.delays[i], warm=False)
         for i in scan.best(FITTED, data.min_moves, apart)
     ]
     if not fitted:
         return model
     best = min(fitted, key=lambda candidate: candidate.loss)
-    parents, ranges = best.friction[valve][None, :], nearby_delays(data, best, valve)
-    return descend(data, best, orders, valve, parents, Criterion.INNOVATIONS, ranges)
+    return descend(data, best, valve, best.friction[valve][None, :])
 
 
-def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model:
+def improve_valve(data: Data, model: Model, valve: int) -> Model:
     """Improve one valve's friction under the model's own noise until nothing changes."""
     if model.friction[valve, 0] == 0.0:
         return model
     limit = float(data.limit[valve])
-    best, _ = refine(data, model, orders, valve, REJECTED)
+    best, _ = refine(data, model, valve, REJECTED)
     for _ in range(SWEEPS):
         before, friction = best.loss, best.friction[valve]
-        jumps, reverses = neighbouring_lines(data, best, orders, valve)
+        jumps, reverses = neighbouring_lines(data, best, valve)
         cross = cross_grid(jumps, reverses, limit, CROSS)
         grid = np.vstack([coarse_grid(limit), cross])
-        scan = scan_valve(data, best, orders, valve, grid, best.start[valve])
+        everywhere = PatternSearch(data, best, valve)
+        scan = everywhere.scan(grid, float(best.start[valve]))
         chosen = grid[scan.best(PARENTS - 2, data.min_moves, APART * limit)]
         parents = np.vstack([friction, chosen])
-        ranges = nearby_delays(data, best, valve)
-        best = descend(data, best, orders, valve, parents, Criterion.INNOVATIONS, ranges)
+        best = descend(data, best, valve, parents)
         if best.loss > before - LEAST_GAIN:
             break
-        best = comb(data, best, orders, valve)
-        best, _ = refine(data, best, orders, valve, REJECTED)
+        best = comb(data, best, valve)
+        best, _ = refine(data, best, valve, REJECTED)
     return best
 
 
-def neighbouring_lines(
-    data: Data, model: Model, orders: Orders, valve: int
-) -> tuple[FloatArray, FloatArray]:
+def neighbouring_lines(data: Data, model: Model, valve: int) -> tuple[FloatArray, FloatArray]:
     """Return J and S of the model and just beyond its cell."""
     friction = model.friction[valve]
     (jump, reverse), limit = points_of(friction[None, :])[0], float(data.limit[valve])
-    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve))
+    search = PatternSearch(data, model, valve, wander=1)
     _, cells = best_in_cells(search, friction[None, :], float(model.start[valve]))
     jl, jh, sl, sh = np.clip(cells.bounds[0], 0.0, 2.0 * limit)
     beyond = [
@@ -208,71 +190,44 @@ def neighbouring_lines(
 def descend(
     data: Data,
     model: Model,
-    orders: Orders,
     valve: int,
     parents: FloatArray,
-    criterion: Criterion,
-    ranges: DelayRanges,
+    criterion: Criterion = Criterion.INNOVATIONS,
+    wander: int | None = 1,
     warm: bool = True,
 ) -> Model:
     """Scan finer and finer round several parents (f_S, f_D); return the better model.
 
     Args:
-        parents: shape (G, 2).
-        ranges: delays scanned, per output.
+        parents: shape (G, 2), at least one.
+        criterion, wander: of the scans, see :class:`PatternSearch`.
         warm: start the exact fit from that of ``model``.
     """
-    rows, delays = zoom(data, model, orders, valve, parents, criterion, ranges)
-    if not len(rows):
-        return model
-    start = float(model.start[valve])
-    rival = with_valve(data, model, orders, valve, rows[0], start, delays[0], warm=warm)
-    return min(model, rival, key=lambda candidate: candidate.loss)
-
-
-def zoom(
-    data: Data,
-    model: Model,
-    orders: Orders,
-    valve: int,
-    parents: FloatArray,
-    criterion: Criterion,
-    ranges: DelayRanges,
-) -> tuple[FloatArray, FloatArray]:
-    """Return the best rows (f_S, f_D) of ever finer grids round the parents, and delays.
-
-    Returns:
-        Rows, best first, shape (G, 2), G = 0 when the valve moves too seldom in all of them,
-        and delays per output, shape (G, p).
-    """
     limit, start = float(data.limit[valve]), float(model.start[valve])
-    nothing = np.empty((0, 2)), np.empty((0, len(data.y)), dtype=int)
-    if not len(parents):
-        return nothing
-    patterns = PatternSearch(data, model, orders, valve, ranges, criterion=criterion)
+    patterns = PatternSearch(data, model, valve, wander, criterion=criterion)
     parents, _ = best_in_cells(patterns, parents, start)
     step = APART * limit
     while step > FINEST * limit:
         step /= 3.0
         grid = finer_grid(parents, step, limit)
-        scan = patterns.scan(grid, start)
-        chosen = scan.best(PARENTS, data.min_moves, 1.5 * step)
+        chosen = patterns.scan(grid, start).best(PARENTS, data.min_moves, 1.5 * step)
         if not chosen:
-            return nothing
+            return model
         parents, cells = best_in_cells(patterns, grid[chosen], start)
         order = np.argsort(cells.loss, kind="stable")
         parents, delays = parents[order], cells.delays[order]
-    return parents, delays
+    rival = with_valve(data, model, valve, parents[0], start, delays[0], warm=warm)
+    return min(model, rival, key=lambda candidate: candidate.loss)
 
 
-def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
+def comb(data: Data, model: Model, valve: int) -> Model:
     """Try a dense grid round the model and refine its best points; return the better model.
 
     With many slips the right switching pattern can be narrower than 0.1 % of the span and
     its neighbours much worse than a wrong pattern further off.
     """
     limit, start = float(data.limit[valve]), float(model.start[valve])
-    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve))
+    search = PatternSearch(data, model, valve, wander=1)
     step = COMB * limit * min(1.0, SAMPLES / data.u.shape[1])
     grid, half, best = model.friction[valve][None, :], 15, model
     for _ in range(2):
@@ -282,51 +237,47 @@ def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
         grid, half, step = grid[chosen], 3, step / 3.0
     for index in chosen[:2]:
         friction, delays = scan.grid[index], scan.delays[index]
-        rival = with_valve(data, model, orders, valve, friction, start, delays)
+        rival = with_valve(data, model, valve, friction, start, delays)
         best = min(best, rival, key=lambda candidate: candidate.loss)
     return best
 
 
-@dataclasses.dataclass(frozen=True)
-class SearchOutcome:
-    """Where a search ended."""
-
-    model: Model  # the best model
-    # pairs (valve with friction, valve whose friction explains the record as well)
-    rivals: tuple[tuple[int, int], ...] = ()
-
-
-def search(data: Data, model: Model, orders: Orders, growing: bool = True) -> SearchOutcome:
+def search(
+    data: Data, model: Model, growing: bool = True
+) -> tuple[Model, tuple[tuple[int, int], ...]]:
     """Coordinate search over all valves: the most promising first, until nothing changes.
 
     Args:
         growing: take a short record in piece by piece as well, under He's law
             (:mod:`.growing_patterns`).
+
+    Returns:
+        The best model, and pairs (valve with friction, valve whose friction does as well).
     """
     left, rivals = list(range(len(data.u))), []
     while left:
-        scans = together(*(partial(first_scan, data, model, orders, valve) for valve in left))
+        scans = together(*(partial(first_scan, data, model, valve) for valve in left))
         first = max(scans, key=lambda scan: scan.gain)
-        found = first_search(data, orders, first, growing)
-        model = improve_valve(data, found, orders, first.valve)
+        found = first_search(data, first, growing)
+        model = improve_valve(data, found, first.valve)
         left.remove(first.valve)
         for scan in scans:
             if scan is not first and scan.gain > ALIKE * first.gain > EQUAL:
-                other = first_search(data, orders, scan, growing)
-                other = improve_valve(data, other, orders, scan.valve)
+                other = first_search(data, scan, growing)
+                other = improve_valve(data, other, scan.valve)
                 if other.loss < model.loss + EQUAL:
                     rivals.append((first.valve, scan.valve))
     if np.count_nonzero(model.friction[:, 0]) > 1:
-        model = improve(data, model, orders)
-    return SearchOutcome(model, tuple(rivals))
+        model = improve(data, model)
+    return model, tuple(rivals)
 
 
-def improve(data: Data, model: Model, orders: Orders) -> Model:
+def improve(data: Data, model: Model) -> Model:
     """Improve the friction of one sticky valve after the other until nothing changes."""
     for _ in range(EXACT_SEARCH_ROUNDS):
         gains = [0.0]
         for valve in np.flatnonzero(model.friction[:, 0]):
-            better = improve_valve(data, model, orders, int(valve))
+            better = improve_valve(data, model, int(valve))
             gains.append(model.loss - better.loss)
             model = better
         if max(gains) < LEAST_GAIN:

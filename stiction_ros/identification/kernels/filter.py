@@ -6,7 +6,6 @@ import numpy as np
 
 from stiction_ros.compiled import compiled, compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.kernels.row import averaged
 from stiction_ros.lanes import LANES, halves_swapped, put, row, spread
 
 
@@ -74,40 +73,6 @@ def _recursion(a: FloatArray, z: FloatArray) -> None:
         now = now - a1 * one
         put(z, LANES * k, now)
         three, two, one = two, one, now
-
-
-@compiled
-def tails_of(
-    rows: FloatArray, numerator: FloatArray, denominator: FloatArray, samples: int, length: int
-) -> FloatArray:
-    """Return what a step at each sample adds to the products with filtered rows, shape (length, q).
-
-    Rows, filtered by D/A backwards in time, are summed up from their end.
-
-    Args:
-        rows: shape (q, n), their last sample is the last of N.
-        samples: N.
-        length: at least N; 0 from there on.
-    """
-    count, order, size = len(rows), len(numerator) - 1, rows.shape[1]
-    out = np.zeros((length, count))
-    z = np.empty((samples, LANES))
-    backwards, moved = np.zeros(size + 2 * order), np.empty(size + order)
-    for begin in range(0, count, LANES):
-        for k in range(samples):
-            put(z, LANES * k, spread(0.0))
-        width = min(LANES, count - begin)
-        for lane in range(width):
-            for k in range(size):
-                backwards[order + k] = rows[begin + lane, size - 1 - k]
-            averaged(numerator, backwards, order, size + order, moved)
-            for k in range(size + order):
-                z[k, lane] = moved[k]
-        _recursion(denominator, z)
-        for k in range(samples):
-            for lane in range(width):
-                out[samples - 1 - k, begin + lane] = z[k, lane]
-    return out
 
 
 @compiled_fused

@@ -10,10 +10,9 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.kernels.copies import put, put_block
+from stiction_ros.identification.kernels.copies import put
 from stiction_ros.identification.kernels.delay import DEPENDENT, delay_energy
-from stiction_ros.identification.kernels.filter import Window, filtered_products, tails_of
-from stiction_ros.identification.kernels.row import averaged, driven_rows
+from stiction_ros.identification.kernels.filter import Window, filtered_products
 
 STEMS = 64  # whose products are kept at a time
 
@@ -38,52 +37,6 @@ def orthonormal(columns: FloatArray, tolerance: float) -> FloatArray:
             put(out[kept], now / size)
             kept += 1
     return out[:kept].copy()
-
-
-@compiled
-def remaining_tails(
-    signals: FloatArray,
-    columns: IntArray,
-    window: tuple[int, int],
-    prefilter: tuple[FloatArray, FloatArray],
-    tolerance: float,
-) -> tuple[FloatArray, float]:
-    """Return what a step at each sample adds to the products with columns and with the rest.
-
-    The rest is what the columns leave of the first signal, the output.
-
-    Args:
-        signals: each after as many zeros as D has lags, shape (s, n_d + N).
-        columns: rows (signal, lag), of the filtered signals, shape (q, 2).
-        window: first sample of the criterion, and length of the tails.
-        prefilter: D and A.
-        tolerance: see :func:`orthonormal`.
-
-    Returns:
-        Tails, shape (length, q' + 1) of the q' columns that are independent, the rest's last,
-        and the sum of squares of the rest.
-    """
-    (numerator, denominator), (first, length) = prefilter, window
-    order = len(numerator) - 1
-    count = signals.shape[1] - order
-    moved, filtered = np.empty((len(signals), count)), np.empty((len(signals), count))
-    for i in range(len(signals)):
-        averaged(numerator, signals[i], order, count, moved[i])
-    driven_rows(denominator, moved, 0, len(signals), filtered)
-    rows = np.empty((len(columns), count - first))
-    for i in range(len(columns)):
-        signal, lag = columns[i]
-        for k in range(count - first):
-            rows[i, k] = filtered[signal, first - lag + k]
-    basis = orthonormal(rows, tolerance)
-    products = np.empty((len(basis) + 1, count - first))
-    put_block(products[: len(basis)], basis)
-    target, rest = filtered[0, first:], products[len(basis)]
-    explained = np.dot(np.dot(basis, target), basis)
-    for k in range(len(rest)):
-        rest[k] = target[k] - explained[k]
-    energy = max(np.dot(rest, rest), 1e-300)
-    return tails_of(products, numerator, denominator, count, length), energy
 
 
 @compiled

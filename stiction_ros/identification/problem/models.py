@@ -14,16 +14,14 @@ from stiction_ros.effects import FloatArray, FrictionLaw
 from stiction_ros.identification.friction import simulate
 from stiction_ros.identification.kernels.scan import best_apart
 from stiction_ros.identification.problem.output_error import Orders, OutputFit, fit_output
-from stiction_ros.identification.problem.scan import BATCH, OutputScan
+from stiction_ros.identification.problem.scan import OutputScan
 from stiction_ros.identification.side_by_side import together
-from stiction_ros.identification.switching import StepSignals, stem_steps
+from stiction_ros.identification.switching import StepSignals
 
 DELAY_MARGIN = 10.8
 EQUAL = 3.84
-WORTHWHILE = 400_000  # samples of all stems or patterns, from which on two threads share them
 
 
-DelayRanges = tuple[tuple[int, int], ...]
 AllDelays = tuple[tuple[int, ...], ...]
 
 
@@ -33,11 +31,6 @@ class Criterion(enum.Enum):
     ONE_STEP = enum.auto()
     FREE_RUN = enum.auto()
     INNOVATIONS = enum.auto()
-
-    @property
-    def filtered(self) -> bool:
-        """Whether the data are filtered by the model's 1/A."""
-        return self is not Criterion.ONE_STEP
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,23 +43,11 @@ class Data:
     limit: FloatArray  # largest f_S per valve, %, shape (m,)
     delay: tuple[int, int]  # inclusive range of t_d
     min_moves: int  # fewest stem moves of an accepted candidate
-    # per valve, values at which the law's parameters behind f_S and f_D are held; empty for a law
-    # that has no others
-    further: tuple[tuple[float, ...], ...] = ()
 
     def part(self, begin: int, end: int) -> "Data":
         """Return the samples from ``begin`` to before ``end``."""
         y, u = (np.ascontiguousarray(signal[:, begin:end]) for signal in (self.y, self.u))
         return dataclasses.replace(self, y=y, u=u)
-
-    def further_of(self, valve: int) -> tuple[float, ...]:
-        """The law's further parameters at a valve."""
-        return self.further[valve] if self.further else ()
-
-    @property
-    def delays(self) -> DelayRanges:
-        """The range of t_d for each output."""
-        return (self.delay,) * len(self.y)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,6 +63,19 @@ class Model:
     def beginning(self, count: int) -> "Model":
         """Return the model with the first ``count`` samples of its stems."""
         return dataclasses.replace(self, stems=np.ascontiguousarray(self.stems[:, :count]))
+
+    def with_stem(
+        self, valve: int, stem: FloatArray, friction: FloatArray | float, start: float
+    ) -> "Model":
+        """Return the model with another stem of one valve; what was fitted stays."""
+        stems, frictions, starts = self.stems.copy(), self.friction.copy(), self.start.copy()
+        stems[valve], frictions[valve], starts[valve] = stem, friction, start
+        return dataclasses.replace(self, stems=stems, friction=frictions, start=starts)
+
+    @property
+    def orders(self) -> Orders:
+        """Orders of the fits."""
+        return self.fits[0].orders
 
     @property
     def loss(self) -> float:
@@ -104,11 +98,6 @@ class ValveScan:
     delays: FloatArray  # the best delay per output, shape (G, p)
     moves: FloatArray  # shape (G,)
 
-    def part(self, begin: int, end: int) -> "ValveScan":
-        """Return the rows from ``begin`` to before ``end``."""
-        columns = (getattr(self, field.name) for field in dataclasses.fields(self))
-        return ValveScan(*(column[begin:end] for column in columns))
-
     def best(self, count: int, min_moves: int, apart: float) -> list[int]:
         """Return up to ``count`` best rows at least ``apart`` from each other."""
         loss = np.where(self.moves < min_moves, np.inf, self.loss)
@@ -118,8 +107,7 @@ class ValveScan:
 def stem_of(data: Data, valve: int, friction: FloatArray, start: float) -> FloatArray:
     """Return the stem of one valve, shape (N,)."""
     u = data.u[valve]
-    further = data.further_of(valve)
-    stems = simulate(data.law, friction[None, :], u, float(u[0] + start), further)
+    stems = simulate(data.law, friction[None, :], u, float(u[0] + start))
     return np.ascontiguousarray(stems[:, 0])
 
 
@@ -129,7 +117,7 @@ def output_scans(
     orders: Orders,
     valve: int,
     criterion: Criterion,
-    ranges: DelayRanges,
+    ranges: Sequence[tuple[int, int]],
     free: FloatArray | None = None,
 ) -> list[OutputScan]:
     """Return one scan per output, the other valves of ``model`` fixed."""
@@ -143,63 +131,11 @@ def output_scans(
             orders,
             delay,
             model.fits[i].noise if criterion is Criterion.INNOVATIONS else one,
-            model.fits[i].a if criterion.filtered else one,
+            one if criterion is Criterion.ONE_STEP else model.fits[i].a,
             free,
         )
         for i, (y, delays, delay) in enumerate(zip(data.y, model.delays, ranges, strict=True))
     ]
-
-
-def scan_valve(
-    data: Data,
-    model: Model,
-    orders: Orders,
-    valve: int,
-    grid: FloatArray,
-    starts: FloatArray | float,
-    criterion: Criterion = Criterion.INNOVATIONS,
-    ranges: DelayRanges | None = None,
-) -> ValveScan:
-    """Scan the friction of ``valve`` with the other valves of ``model`` fixed.
-
-    Args:
-        starts: stem before the first sample minus first OP, %, shape (G,) or one for all.
-        criterion: filter by 1, 1/A or D/A of the model's fits.
-        ranges: delays scanned, one range per output; None is that of the data for all.
-    """
-    ranges = ranges or data.delays
-    scans = output_scans(data, model, orders, valve, criterion, ranges)
-    return scan_stems(data, valve, grid, starts, scans, ranges)
-
-
-def scan_stems(
-    data: Data,
-    valve: int,
-    grid: FloatArray,
-    starts: FloatArray | float,
-    scans: Sequence[OutputScan],
-    ranges: DelayRanges,
-) -> ValveScan:
-    """Scan as :func:`scan_valve` by a criterion that stands, one scan per output."""
-    u = np.ascontiguousarray(data.u[valve])
-    starts = np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
-    begins = u[0] + starts
-    loss, moves = np.zeros(len(grid)), np.zeros(len(grid))
-    best = np.zeros((len(grid), len(data.y)), dtype=int)
-
-    def scanned(rows: slice) -> None:
-        stems = stem_steps(data.law, grid[rows], u, begins[rows], data.further_of(valve))
-        moves[rows] = stems.moves
-        for i, scan in enumerate(scans):
-            energy, delays = scan.least_energy(stems)
-            best[rows, i] = delays + ranges[i][0]
-            loss[rows] += scan.count * np.log(energy / scan.count)
-
-    shared = len(grid) * len(u) >= WORTHWHILE
-    batch = min(BATCH, (len(grid) + 1) // 2) if shared else BATCH
-    batches = (slice(at, at + batch) for at in range(0, len(grid), batch))
-    together(*(partial(scanned, rows) for rows in batches))
-    return ValveScan(grid, starts, loss, best, moves)
 
 
 def with_delays(
@@ -215,7 +151,6 @@ def with_delays(
 def with_valve(
     data: Data,
     model: Model,
-    orders: Orders,
     valve: int,
     friction: FloatArray,
     first: float,
@@ -223,22 +158,9 @@ def with_valve(
     warm: bool = True,
 ) -> Model:
     """Return the exact model with one valve's friction, start and delays replaced."""
-    stems = model.stems.copy()
-    stems[valve] = stem_of(data, valve, friction, first)
-    all_friction, start = model.friction.copy(), model.start.copy()
-    all_friction[valve], start[valve] = friction, first
-    return refit(
-        data,
-        dataclasses.replace(
-            model,
-            friction=all_friction,
-            start=start,
-            stems=stems,
-            delays=with_delays(model.delays, valve, delays),
-        ),
-        orders,
-        warm,
-    )
+    moved = model.with_stem(valve, stem_of(data, valve, friction, first), friction, first)
+    moved = dataclasses.replace(moved, delays=with_delays(model.delays, valve, delays))
+    return refit(data, moved, model.orders, warm)
 
 
 def refit(data: Data, model: Model, orders: Orders, warm: bool = True) -> Model:
@@ -267,7 +189,7 @@ def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model
     tried = {model.delays}
     for _ in range(3):
         before = model.loss
-        model = improve_delays(data, model, orders, tried)
+        model = improve_delays(data, model, tried)
         if model.loss > before - 1e-3:
             break
     return model
@@ -277,15 +199,14 @@ def _best_delays(
     data: Data, model: Model, orders: Orders, valve: int, criterion: Criterion
 ) -> AllDelays:
     """Return the model's delays with those of one valve at the least SE."""
-    scans = output_scans(data, model, orders, valve, criterion, data.delays)
+    ranges = (data.delay,) * len(data.y)
+    scans = output_scans(data, model, orders, valve, criterion, ranges)
     stem = StepSignals.of(model.stems[valve][:, None])
-    best = [data.delay[0] + int(scan.energy(stem)[0].argmin()) for scan in scans]
+    best = [data.delay[0] + int(scan.least_energy(stem)[1][0]) for scan in scans]
     return with_delays(model.delays, valve, best)
 
 
-def improve_delays(
-    data: Data, model: Model, orders: Orders, tried: set[AllDelays] | None = None
-) -> Model:
+def improve_delays(data: Data, model: Model, tried: set[AllDelays] | None = None) -> Model:
     """Scan all delays of every channel with the stems fixed; keep what the exact fit favours.
 
     Args:
@@ -296,18 +217,17 @@ def improve_delays(
     tried = set() if tried is None else tried
     for valve in range(len(data.u)):
         for criterion in (Criterion.FREE_RUN, Criterion.INNOVATIONS):
-            delays = _best_delays(data, model, orders, valve, criterion)
+            delays = _best_delays(data, model, model.orders, valve, criterion)
             if delays == model.delays or delays in tried:
                 continue
             tried.add(delays)
-            rival = refit(data, dataclasses.replace(model, delays=delays), orders, warm=False)
+            moved = dataclasses.replace(model, delays=delays)
+            rival = refit(data, moved, model.orders, warm=False)
             model = min(model, rival, key=lambda candidate: candidate.loss)
     return model
 
 
-def settle_delays(
-    data: Data, model: Model, orders: Orders
-) -> tuple[Model, list[list[tuple[int, ...]]]]:
+def settle_delays(data: Data, model: Model) -> tuple[Model, list[list[tuple[int, ...]]]]:
     """Choose each channel's delay by the exact fit: the longest that is not rejected.
 
     A leading coefficient that the record cannot tell from zero counts as delay: a shorter
@@ -321,7 +241,7 @@ def settle_delays(
     for i in range(len(data.y)):
         equal.append([])
         for j in range(len(data.u)):
-            rivals = _neighbours(data, model, orders, i, j)
+            rivals = _neighbours(data, model, i, j)
             best = min(rivals.values(), key=lambda fit: fit.loss)
             near = [d for d, fit in rivals.items() if fit.loss <= best.loss + DELAY_MARGIN]
             alike = [d for d, fit in rivals.items() if fit.loss <= best.loss + EQUAL]
@@ -333,7 +253,7 @@ def settle_delays(
     return model, equal
 
 
-def _neighbours(data: Data, model: Model, orders: Orders, i: int, j: int) -> dict[int, OutputFit]:
+def _neighbours(data: Data, model: Model, i: int, j: int) -> dict[int, OutputFit]:
     """Return fits by delay of channel (i, j), out from the present one until rejected."""
     now = model.delays[i][j]
 
@@ -342,7 +262,7 @@ def _neighbours(data: Data, model: Model, orders: Orders, i: int, j: int) -> dic
         while data.delay[0] <= delay <= data.delay[1]:
             row = list(model.delays[i])
             row[j] = delay
-            met[delay] = fit_output(data.y[i], model.stems, tuple(row), orders)
+            met[delay] = fit_output(data.y[i], model.stems, tuple(row), model.orders)
             if met[delay].loss > best + DELAY_MARGIN:
                 break
             best, delay = min(best, met[delay].loss), delay + shift

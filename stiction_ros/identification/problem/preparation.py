@@ -3,7 +3,7 @@
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.friction import find_law, first_values
+from stiction_ros.identification.friction import find_law
 from stiction_ros.identification.identification_options import IdentificationOptions, limited
 from stiction_ros.identification.problem.input_checks import (
     TOO_SHORT,
@@ -18,52 +18,38 @@ MIN_SAMPLES = 60
 PART = 6000
 """Samples of a long record that are searched; all of it is concluded from. A friction that suits
 them is within a few thousandths of the best for the whole, round which alone all are looked at."""
-DEFAULT_ORDERS = (1, 2, 3)
+ORDERS = (1, 2, 3)  # n_a that are tried unless one is given
 
 
 def prepare(record: Record, options: IdentificationOptions) -> Data:
     """Return the centred, scaled data; raise :class:`InputError` when they are unusable."""
     require_signals(record)
-    orders = window(
-        options, max(tried_orders(options)), input_order_for(options, max(tried_orders(options)))
-    )
+    orders = windows(options)[-1]
     free = 2 * orders.output + len(record.valves) * orders.input + orders.noise + 3
     needed = orders.first + max(MIN_SAMPLES, 5 * free)
     require_samples(record, needed, TOO_SHORT)
     u, y = np.ascontiguousarray(record.op.T), np.ascontiguousarray(record.pv.T)
-    law = find_law(options.first_law)
-    first = first_values(law)
     return Data(
         y=(y - y.mean(axis=1, keepdims=True)) / y.std(axis=1, keepdims=True),
         u=u - u.mean(axis=1, keepdims=True),
-        law=law,
+        law=find_law(options.first_law),
         limit=limited(np.ptp(u, axis=1), options.friction_limit),
         delay=options.delay,
         min_moves=options.min_moves,
-        further=(first,) * len(u) if first else (),
     )
-
-
-def tried_orders(options: IdentificationOptions) -> tuple[int, ...]:
-    """Return the n_a that are tried."""
-    return DEFAULT_ORDERS if options.output_order is None else (options.output_order,)
-
-
-def input_order_for(options: IdentificationOptions, output_order: int) -> int:
-    """Return the n_b that goes with an n_a."""
-    return output_order if options.input_order is None else options.input_order
 
 
 def windows(options: IdentificationOptions) -> list[Orders]:
     """Return all orders that are tried, on one window."""
-    return [window(options, n, input_order_for(options, n)) for n in tried_orders(options)]
+    tried = ORDERS if options.output_order is None else (options.output_order,)
+    return [window(options, n, options.input_order or n) for n in tried]
 
 
 def window(options: IdentificationOptions, output_order: int, input_order: int) -> Orders:
     """Return orders with the one window that suits all rivals of this identification."""
-    largest = max(tried_orders(options)) + 2
-    largest_input = input_order_for(options, max(tried_orders(options))) + 2
-    first = options.delay[1] + 2 * largest_input + largest + options.noise_order + 1
+    most = options.output_order or max(ORDERS)
+    beyond = most + 2, (options.input_order or most) + 2  # the orders of friction-free rivals
+    first = options.delay[1] + 2 * beyond[1] + beyond[0] + options.noise_order + 1
     return Orders(output_order, input_order, options.noise_order, first)
 
 

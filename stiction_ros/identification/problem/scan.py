@@ -6,18 +6,15 @@ What does not depend on the scanned valve is projected out once; the rest is a b
 n_b × n_b systems built from lagged correlations.
 """
 
-import dataclasses
-
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.kernels.delay import delay_energy
 from stiction_ros.identification.kernels.filter import Window
-from stiction_ros.identification.kernels.scan import least_energy, remaining_tails, step_products
+from stiction_ros.identification.kernels.row import through
+from stiction_ros.identification.kernels.scan import least_energy, orthonormal, step_products
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.switching import StepSignals
 
-BATCH = 500  # signals that are worked on together
 EXPLAINED = 1e-7  # of a column, below which the others explain it
 
 
@@ -56,60 +53,35 @@ class OutputScan:
             raise ValueError(f"the window begins at {first}, before what its lags need")
         numerator = np.ascontiguousarray(numerator, dtype=float)
         denominator = np.ascontiguousarray(denominator, dtype=float)
-        # Columns that every stem has beside its own: a signal by its index, and its lag.
-        signals = np.zeros((len(others) + 4, len(numerator) - 1 + count))
-        y_row, ones, impulse, left_free = 0, *range(len(others) + 1, len(others) + 4)
-        rows = signals[:, len(numerator) - 1 :]
-        rows[y_row], rows[1:ones], rows[ones] = y, others, 1.0
-        rows[impulse, first - orders.noise - len(denominator)] = 1.0
-        columns = [(y_row, lag) for lag in range(1, orders.output + 1)]
-        for j, skipped in enumerate(other_delays):
-            columns += [(1 + j, skipped + lag) for lag in range(1, orders.input + 1)]
-        columns.append((ones, 0))
+        impulse = (np.arange(count) == first - orders.noise - len(denominator)).astype(float)
+        # Signals that every stem has beside itself, each with its lags.
+        beside: list[tuple[FloatArray, range]] = [(y, range(1, orders.output + 1))]
+        for other, skipped in zip(others, other_delays, strict=True):
+            beside.append((other, range(skipped + 1, skipped + orders.input + 1)))
+        beside.append((np.ones(count), range(1)))
         if free is not None:
-            rows[left_free] = free
-            columns += [(left_free, lag) for lag in lags]
-        columns += [(impulse, lag) for lag in range(len(denominator) - 1)]
-        tails, self.rest_energy = remaining_tails(
-            signals,
-            np.array(columns),
-            (first, count + lags[-1] + 1),
-            (numerator, denominator),
-            EXPLAINED,
-        )
-        self.count = count - first
+            beside.append((free, lags))
+        beside.append((impulse, range(len(denominator) - 1)))
+        filtered = through(np.array([row for row, _ in beside]), numerator, denominator, count)
+        pairs = [(row, lag) for row, (_, own) in zip(filtered, beside, strict=True) for lag in own]
+        found = np.array([row[first - lag : count - lag] for row, lag in pairs])
+        basis, target = orthonormal(found, EXPLAINED), filtered[0, first:]
+        rest = target - (basis @ target) @ basis
+        self.rest_energy = max(float(rest @ rest), 1e-300)
+        products = np.ascontiguousarray(np.vstack([basis, rest])[:, ::-1])
+        backwards = through(products, numerator, denominator, count)
+        tails = np.zeros((count + lags[-1] + 1, len(backwards)))
+        tails[:count] = np.cumsum(backwards, axis=1)[:, ::-1].T
+        self.count, self.delays = count - first, len(lags) - orders.input + 1
         self._window = Window(
             count, first, lags[0], len(lags), orders.input, tails, numerator, denominator
         )
-
-    def energy(self, stems: StepSignals) -> FloatArray:
-        """Return SE, shape (G, T), for G stems and T delays."""
-        products, right = step_products(self._window, stems.offsets, stems.places, stems.values)
-        return delay_energy(products, right, self.rest_energy)
 
     def least_energy(self, stems: StepSignals) -> tuple[FloatArray, IntArray]:
         """Return the least SE over the delays and the place of its delay, shape (G,) each."""
         rows = stems.offsets, stems.places, stems.values
         return least_energy(self._window, *rows, self.rest_energy)
 
-    def patterns(self, patterns: StepSignals) -> "PatternEnergy":
-        """Return what SE of the stems base − level · sign is computed from, the two channels."""
-        products, rights = step_products(
-            self._window, patterns.offsets, patterns.places, patterns.values
-        )
-        return PatternEnergy(products, rights)
-
-
-@dataclasses.dataclass(frozen=True)
-class PatternEnergy:
-    """What SE of switching patterns is computed from; the stem is affine in f_D."""
-
-    # of what the columns leave of base with base, base with sign and sign with sign, shape (G, 3,
-    # n_b, L)
-    products: FloatArray
-    rights: FloatArray  # of base and sign with the rest, shape (G, 2, L)
-
-    @property
-    def delays(self) -> int:
-        """T, number of delays."""
-        return int(self.products.shape[3] - self.products.shape[2] + 1)
+    def products(self, signals: StepSignals) -> tuple[FloatArray, FloatArray]:
+        """Return the products of signals by lag, and those with the rest, of one channel or two."""
+        return step_products(self._window, signals.offsets, signals.places, signals.values)

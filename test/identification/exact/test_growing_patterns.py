@@ -25,7 +25,6 @@ from stiction_ros.identification.exact.growing_patterns import (
 from stiction_ros.identification.exact.pattern_search import PatternSearch, area
 from stiction_ros.identification.exact.search import search
 from stiction_ros.identification.problem.models import Criterion, Data, Model, linear_model
-from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import prepare, window
 from stiction_ros.identification.switching import Beginning, beginning_of, cells_at
 from stiction_studies.examples import example2
@@ -36,21 +35,21 @@ def random_walk(seed: int, samples: int = 200) -> FloatArray:
 
 
 @pytest.fixture(scope="module")
-def loop() -> tuple[Data, Model, Orders]:
+def loop() -> tuple[Data, Model]:
     """Return the first 600 samples of Example 1 and a model without friction."""
     record = loops.example1(1, "equation", samples=600)
     options = IdentificationOptions(output_order=3, input_order=3, delay=(4, 6))
-    data, orders = prepare(record, options), window(options, 3, 3)
-    return data, linear_model(data, orders), orders
+    data = prepare(record, options)
+    return data, linear_model(data, window(options, 3, 3))
 
 
-def on_window(loop: tuple[Data, Model, Orders], count: int, begin: Beginning) -> PatternSearch:
-    data, model, orders = loop
+def on_window(loop: tuple[Data, Model], count: int, begin: Beginning) -> PatternSearch:
+    data, model = loop
     part, shown = data.part(0, count), model.beginning(count)
-    return PatternSearch(part, shown, orders, 0, data.delays, begin, Criterion.ONE_STEP)
+    return PatternSearch(part, shown, 0, begin=begin, criterion=Criterion.ONE_STEP)
 
 
-def branch_at(loop: tuple[Data, Model, Orders], count: int, point: FloatArray) -> Branch:
+def branch_at(loop: tuple[Data, Model], count: int, point: FloatArray) -> Branch:
     begin = beginning_of(loop[0].u[0], float(loop[0].u[0, 0]), 5.0)
     search = on_window(loop, count, begin)
     scan = search.evaluate(cells_at(search.u, begin, point[None, :]))
@@ -59,7 +58,7 @@ def branch_at(loop: tuple[Data, Model, Orders], count: int, point: FloatArray) -
 
 @given(jump=st.floats(0.3, 6.0), more=st.floats(0.5, 6.0), longer=st.integers(210, 400))
 def test_cells_of_a_longer_window_fill_the_cell_they_come_from(
-    loop: tuple[Data, Model, Orders], jump: float, more: float, longer: int
+    loop: tuple[Data, Model], jump: float, more: float, longer: int
 ) -> None:
     branch = branch_at(loop, 200, np.array([jump, jump + more]))
     square = np.array([jump - 0.2, jump + 0.2, jump + more - 0.2, jump + more + 0.2])
@@ -92,10 +91,10 @@ def test_op_that_rests_has_no_first_slip() -> None:
     assert first_slips(np.zeros(50)) == []
 
 
-def test_a_record_whose_op_rests_at_first_keeps_its_model(loop: tuple[Data, Model, Orders]) -> None:
-    data, model, orders = loop
+def test_a_record_whose_op_rests_at_first_keeps_its_model(loop: tuple[Data, Model]) -> None:
+    data, model = loop
     still = dataclasses.replace(data, u=np.where(np.arange(600) < 590, 0.0, data.u))
-    assert growing_patterns(still, model, orders, 0) is model
+    assert growing_patterns(still, model, 0) is model
 
 
 def test_lines_cross_in_the_middle() -> None:
@@ -105,7 +104,7 @@ def test_lines_cross_in_the_middle() -> None:
     assert (lines[:, [1, 3]] > lines[:, [0, 2]]).all()
 
 
-def test_few_cells_are_kept_from_the_same_place(loop: tuple[Data, Model, Orders]) -> None:
+def test_few_cells_are_kept_from_the_same_place(loop: tuple[Data, Model]) -> None:
     begin = beginning_of(loop[0].u[0], float(loop[0].u[0, 0]), 5.0)
     branch = first_branch(on_window(loop, 200, begin), begin)
     best = spread(branch.scan, 1.0, 20, 2)
@@ -117,7 +116,7 @@ def test_few_cells_are_kept_from_the_same_place(loop: tuple[Data, Model, Orders]
     assert (np.diff(branch.scan.loss[best]) >= 0.0).all()
 
 
-def test_thinned_branches_keep_their_own_cells(loop: tuple[Data, Model, Orders]) -> None:
+def test_thinned_branches_keep_their_own_cells(loop: tuple[Data, Model]) -> None:
     begin = beginning_of(loop[0].u[0], float(loop[0].u[0, 0]), 5.0)
     other = dataclasses.replace(begin, first=begin.first + 1)
     branches = [first_branch(on_window(loop, 200, slip), slip) for slip in (begin, other)]
@@ -145,8 +144,8 @@ def test_a_needle_that_the_grids_step_over_is_found(plant: str, seed: int) -> No
     data = prepare(example.record, example.options)
     orders = window(example.options, 2, 2)
     linear = linear_model(data, orders)
-    by_grids = search(data, linear, orders, growing=False).model
-    found = growing_patterns(data, linear, orders, 0)
+    by_grids, _ = search(data, linear, growing=False)
+    found = growing_patterns(data, linear, 0)
     assert np.abs(by_grids.friction[0] - [8.0, 1.0]).max() > 0.15
     assert found.friction[0] == pytest.approx([8.0, 1.0], abs=0.15)
     assert found.loss < by_grids.loss - 100.0
@@ -168,4 +167,4 @@ def test_nothing_is_gained_where_there_is_no_friction() -> None:
     )
     orders = window(IdentificationOptions(output_order=1, input_order=1, delay=(0, 0)), 1, 1)
     model = linear_model(data, orders)
-    assert growing_patterns(data, model, orders, 0).loss > model.loss - 10.0
+    assert growing_patterns(data, model, 0).loss > model.loss - 10.0

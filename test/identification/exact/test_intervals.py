@@ -11,24 +11,22 @@ from stiction_ros.identification.exact.intervals import (
     friction_intervals,
 )
 from stiction_ros.identification.problem.models import Data, Model, linear_model, with_valve
-from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import prepare, window
 
 OPTIONS = IdentificationOptions(output_order=3, input_order=3, delay=(5, 5))
 TRUTHS = {"jump": (5.0, 2.0), "deadband": (3.0, 3.0)}
 
 
-def at_truth(friction: tuple[float, float]) -> tuple[Data, Model, Orders]:
+def at_truth(friction: tuple[float, float]) -> tuple[Data, Model]:
     """Return Example 1, shortened, with the true friction in its model."""
     record = loops.example1(3, samples=900, friction=friction)
-    data, orders = prepare(record, OPTIONS), window(OPTIONS, 3, 3)
-    linear = linear_model(data, orders)
-    return data, with_valve(data, linear, orders, 0, np.array(friction), 0.0, np.array([5])), orders
+    data = prepare(record, OPTIONS)
+    linear = linear_model(data, window(OPTIONS, 3, 3))
+    return data, with_valve(data, linear, 0, np.array(friction), 0.0, np.array([5]))
 
 
-def found(case: tuple[Data, Model, Orders], confidence: float) -> FrictionIntervals:
-    data, model, orders = case
-    return friction_intervals(data, model, orders, 0, confidence)
+def found(case: tuple[Data, Model], confidence: float) -> FrictionIntervals:
+    return friction_intervals(*case, 0, confidence)
 
 
 @pytest.fixture(scope="module")

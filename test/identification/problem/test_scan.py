@@ -9,13 +9,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
+from stiction_ros.effects import FloatArray
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.identification.kernels.delay import delay_room, pattern_energy
+from stiction_ros.identification.kernels.delay import delay_energy, delay_room, pattern_energy
 from stiction_ros.identification.problem.models import Model, linear_model, refit
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import prepare, window
 from stiction_ros.identification.problem.scan import OutputScan
 from stiction_ros.identification.switching import StepSignals
+
+
+def energy_of(scan: OutputScan, stems: StepSignals) -> FloatArray:
+    """Return SE of each stem at each delay, shape (G, T)."""
+    return delay_energy(*scan.products(stems), scan.rest_energy)
 
 
 @given(seed=st.integers(0, 1000), na=st.integers(1, 3), nb=st.integers(1, 3))
@@ -26,7 +32,7 @@ def test_one_step_criterion_is_the_least_squares_one(seed: int, na: int, nb: int
     orders = Orders(na, nb, 2, 20)
     one = np.ones(1)
     scan = OutputScan(y, np.empty((0, 200)), (), orders, (0, 4), one, one)
-    energy = scan.energy(StepSignals.of(stems))
+    energy = energy_of(scan, StepSignals.of(stems))
     for g in range(3):
         for delay in range(5):
             columns = [y[20 - i : 200 - i] for i in range(1, na + 1)]
@@ -47,13 +53,12 @@ def test_pattern_energy_is_that_of_the_stem_it_stands_for(seed: int, nb: int, p:
     levels = generator.random((4, 3))
     a, d = np.array([1.0, -0.8]), np.array([1.0, 0.3, 0.1])[: p + 1]
     scan = OutputScan(y, other, (1,), Orders(1, nb, p, 20), (0, 3), d, a)
-    found = scan.patterns(StepSignals.of(bases, signs))
-    energy, room = np.empty((4, found.delays)), delay_room(nb, 3 + nb)
+    products, rights = scan.products(StepSignals.of(bases, signs))
+    energy, room = np.empty((4, scan.delays)), delay_room(nb, 3 + nb)
     for f in range(3):
         for g in range(4):
-            parts = found.products[g], found.rights[g]
-            pattern_energy(*parts, levels[g, f], scan.rest_energy, room, energy[g])
-        expected = scan.energy(StepSignals.of(bases - levels[:, f] * signs))
+            pattern_energy(products[g], rights[g], levels[g, f], scan.rest_energy, room, energy[g])
+        expected = energy_of(scan, StepSignals.of(bases - levels[:, f] * signs))
         assert energy == pytest.approx(expected, rel=1e-7)
 
 
@@ -63,7 +68,7 @@ def test_stem_that_the_rest_explains_to_the_last_digit_explains_nothing() -> Non
     stems = np.stack([np.roll(y, 2), np.full(300, 1e6), np.zeros(300), y[::-1]], axis=1)
     one = np.ones(1)
     scan = OutputScan(y, np.empty((0, 300)), (), Orders(4, 2, 0, 20), (0, 3), one, one)
-    energy = scan.energy(StepSignals.of(stems))
+    energy = energy_of(scan, StepSignals.of(stems))
     assert np.isfinite(energy).all()
     assert energy[1:3] == pytest.approx(scan.rest_energy, rel=1e-6)
     assert (energy[0] > 0.9 * scan.rest_energy).all()
@@ -81,7 +86,7 @@ def test_any_number_of_stems_and_delays(delays: int, count: int, na: int, filter
     d = np.array([1.0, 0.4]) if filtered else np.ones(1)
     orders = Orders(na, 2, 1, 30)
     scan = OutputScan(y, np.empty((0, 300)), (), orders, (1, delays), d, a)
-    energy = scan.energy(StepSignals.of(stems))
+    energy = energy_of(scan, StepSignals.of(stems))
     y, ones, impulse = (lfilter(d, a, x) for x in (y, np.ones(300), np.eye(1, 300, 28 - na)[0]))
     shared = [y[30 - i : 300 - i] for i in range(1, na + 1)] + [ones[30:]]
     if filtered:
