@@ -23,7 +23,7 @@ import numpy as np
 
 from stiction_ros.effects import FrictionLaw, HeStiction
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.effects.friction.moving_rules import FollowingRules, MovingRules
+from stiction_ros.effects.friction.moving_rules import MovingRules
 from stiction_ros.errors import InputError
 from stiction_ros.identification.friction import first_values, simulate
 from stiction_ros.identification.kernels.step import dense_steps, he_pattern_steps, he_steps
@@ -203,7 +203,7 @@ def require_cells(law: type[FrictionLaw]) -> None:
 
 def slip_rules(law: type[FrictionLaw], u: FloatArray) -> MovingRules:
     """Return how a valve leaves its rest under OP u, (N,); under He's law as under Kano's."""
-    return law.switching(u) if isinstance(law.switching, type) else FollowingRules(u)
+    return law.switching(u) if isinstance(law.switching, type) else MovingRules(u)
 
 
 def beginning_of(

@@ -67,8 +67,11 @@ class MovingRules:
         slips = np.flatnonzero(beyond & self.resting_samples(level))
         if not len(slips):
             return len(self.u), 0.0
-        k = int(slips[0])
-        return k, self.slopes[k] if self.waits else float(np.sign(self.values[k] - level))
+        return int(slips[0]), self.direction(int(slips[0]), level)
+
+    def direction(self, k: int, level: float) -> float:
+        """Return in which direction a valve that rests at ``level`` slips at sample k."""
+        return self.slopes[k] if self.waits else float(np.sign(self.values[k] - level))
 
     def trace(
         self, point: Iterable[float], level: float, first: FirstSlip | None = None
