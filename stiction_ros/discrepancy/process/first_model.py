@@ -9,11 +9,11 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification.answer.identified_loop import identified_loop
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.methods import identify
+from stiction_ros.identification.problem.preparation import liveliest_begin
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 
 MOST = 5000  # samples of all records together
-PLACES = 9  # where a part may begin
 
 
 def liveliest_parts(records: Sequence[Record], most: int = MOST) -> tuple[Record, ...]:
@@ -29,10 +29,8 @@ def liveliest_parts(records: Sequence[Record], most: int = MOST) -> tuple[Record
 
 
 def _cut(record: Record, count: int) -> Record:
-    begins = np.unique(np.linspace(0, len(record) - count, PLACES).astype(int)).tolist()
-    span = np.maximum(record.op.std(axis=0), 1e-300)
-    moved = [float((record.op[a : a + count] / span).std(axis=0).sum()) for a in begins]
-    first = begins[int(np.argmax(moved))]
+    scaled = record.op / np.maximum(record.op.std(axis=0), 1e-300)
+    first = liveliest_begin(scaled.T, count)
     note = (
         f"{record.name} is long: samples {first} to {first + count - 1}, in which OP moves most, "
         "were looked at"

@@ -99,13 +99,9 @@ def add_data_effects(model: LoopModel, findings: Sequence[DataFinding]) -> LoopM
             model = model.with_effect(finding.place, finding.behaviour, **note)
             continue
         document = model.to_mapping()
-        if isinstance(finding.behaviour, Tuning):
-            document["controller"] = {
-                "kind": "pi",
-                "gain": finding.behaviour.gain,
-                "integral_time": finding.behaviour.integral_time,
-            }
         values = {key: v for key, v in finding.behaviour.to_mapping().items() if key != "effect"}
+        if isinstance(finding.behaviour, Tuning):
+            document["controller"] = {"kind": "pi", **values}
         document.setdefault("provenance", []).append(note | values)
         model = LoopModel.from_mapping(document, model.name)
     return model

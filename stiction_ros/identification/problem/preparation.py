@@ -62,9 +62,9 @@ def liveliest_part(data: Data) -> Data:
     return data.part(begin, begin + PART)
 
 
-def liveliest_begin(op: FloatArray) -> int:
-    """Return where the ``PART`` samples begin in which OP, scaled, shape (m, N), moves most."""
+def liveliest_begin(op: FloatArray, count: int = PART) -> int:
+    """Return where the ``count`` samples begin in which OP, scaled, shape (m, N), moves most."""
     samples = op.shape[1]
-    begins = np.linspace(0, samples - PART, 2 * (samples // PART) + 1).astype(int)
-    moved = [float(op[:, at : at + PART].std(axis=1).sum()) for at in begins]
+    begins = np.linspace(0, samples - count, 2 * (samples // count) + 1).astype(int)
+    moved = [float(op[:, at : at + count].std(axis=1).sum()) for at in begins]
     return int(begins[int(np.argmax(moved))])
