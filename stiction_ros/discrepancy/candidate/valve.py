@@ -127,10 +127,8 @@ class StictionCandidate(ValveCandidate):
     def leaps(self, point: FloatArray) -> bool:
         return float(1.0 - point[1]) >= LEAST_JUMP * float(1.0 + point[1])
 
-    def scattered(
-        self, point: FloatArray, cube: FloatArray, size: float, *, any_start: bool = False
-    ) -> FloatArray:
-        """Return points, shape (G, axes), in a box around one.
+    def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
+        """Return points, shape (G, axes), in a box around one, with any start of the stem.
 
         It is a box in the sum of the frictions and their difference, the jump. The sum, how far OP
         goes back before the stem follows, is told well by any record; the jump much less.
@@ -139,14 +137,11 @@ class StictionCandidate(ValveCandidate):
             point: values, shape (axes,).
             cube: points between −1 and 1, shape (G, axes).
             size: of the box, 1 for the largest.
-            any_start: whether a stem may have stood anywhere before the first sample.
         """
         total, jump = point[0] * (1.0 + point[1]), point[0] * (1.0 - point[1])
         totals = total * np.exp(SUM_BOX * size * cube[:, 0])
         jumps = np.clip(jump + JUMP_BOX * total * size * cube[:, 1], 0.0, totals)
-        near = np.clip(point[2] + 2.0 * size * cube[:, 2], -1.0, 1.0)
-        leads = cube[:, 2] if any_start else near
-        return self._points(totals, jumps, leads)
+        return self._points(totals, jumps, cube[:, 2])
 
     def along(self, point: FloatArray, cube: FloatArray) -> FloatArray:
         """Return points, shape (G, axes), of about the same sum, with any jump and any start."""

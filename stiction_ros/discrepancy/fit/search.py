@@ -29,12 +29,8 @@ SLOW, SLOWER = np.array([0.8]), np.array([0.95])
 SHRINK = 0.4
 VALLEYS, WIDE = 3, 0.15  # of a needle, that are searched over their whole length; in logarithms
 ALONG = 2000  # points in each
-THROWS = 2
-THROWN = 400
-THROW_SHRINK = 0.7
-CENTRES = 5
-COMBS = (0.1, 0.03, 0.01)  # boxes around the best point, of the largest
-TEETH, STROKES = 3000, 4  # points in each, and how often it is moved to a better one
+BOXES, STROKES = (1.0, 0.3, 0.1, 0.03, 0.01), 2  # of the largest, and how often each is filled
+THROWN = 3000  # points in a box
 GAP_SEARCH_ROUNDS = 5
 FAIR = 3  # rounds after which a start that is surely behind is given up
 POLISHES = 8
@@ -93,7 +89,6 @@ def fit_candidate(
             search.refine(centre, 0.7, ar)
     if candidate.needle and around is None and search.best().delta_bic > 0.0:
         search.scatter()
-        search.comb()
     if candidate.dated:
         if len(candidate.axes) > 1:
             search.polish()
@@ -214,11 +209,13 @@ class _Search:
         return self.candidate
 
     def scatter(self) -> None:
-        """Search scattered points in ever smaller boxes around the best point.
+        """Search scattered points along the best valleys, then in ever smaller boxes.
 
         The optimum of He's law is a needle in a valley: stems that differ in one slip differ
         for long. Points of a lattice miss it however fine they are along the valley. It is looked
-        for over the whole length of the best valleys first, as far from it nothing leads there.
+        for over the whole length of the best valleys first, as far from it nothing leads there;
+        then around the best point, in each box while it gains. The start of a stem is left open in
+        all of them: one that is wrong hides the rest.
         """
         halton = halton_sequence(len(self.candidate.axes), seed=0)
         for fit in self._valleys():
@@ -228,39 +225,12 @@ class _Search:
                 squares = misfit(self.base, self.gap, response, dict.fromkeys(response.outputs, ar))
                 for k in np.argsort(squares)[:LEADERS].tolist():
                     self.judge(values[k], response.pick(k))
-        size = 1.0
-        for _ in range(THROWS):
-            leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:CENTRES]
-            cubes = 2.0 * halton.random(THROWN * len(leading)) - 1.0
-            parts = np.split(cubes, len(leading))
-            values = np.vstack(
-                [
-                    self.needle.scattered(fit.point, cube, size)
-                    for fit, cube in zip(leading, parts, strict=True)
-                ]
-            )
+        for size, _ in itertools.product(BOXES, range(STROKES)):
+            best = self.best()
+            values = self.needle.scattered(best.point, 2.0 * halton.random(THROWN) - 1.0, size)
             response = self.candidate.respond(self.base.run, values)
-            self.best_of(values, response, [*(fit.noise for fit in leading), self.base.noise])
-            for ar in (np.zeros(0), SLOW):
-                self._judge_best(values, response, dict.fromkeys(response.outputs, ar))
-            size *= THROW_SHRINK
-
-    def comb(self) -> None:
-        """Search many points in ever smaller boxes around the best one, in each while they gain.
-
-        The start of a stem is left open in all of them: one that is wrong hides the rest.
-        """
-        halton = halton_sequence(len(self.candidate.axes), seed=0)
-        for size in COMBS:
-            for _ in range(STROKES):
-                best = self.best()
-                cube = 2.0 * halton.random(TEETH) - 1.0
-                values = self.needle.scattered(best.point, cube, size, any_start=True)
-                response = self.candidate.respond(self.base.run, values)
-                self.best_of(values, response, [best.noise, self.base.noise])
-                self._judge_best(values, response, dict.fromkeys(response.outputs, NO_MEMORY))
-                if self.best().delta_bic < best.delta_bic + NEXT_TO_NOTHING:
-                    break
+            self.best_of(values, response, [best.noise, self.base.noise])
+            self._judge_best(values, response, dict.fromkeys(response.outputs, NO_MEMORY))
 
     def _valleys(self) -> list[CandidateFit]:
         """Return the best fits so far, each in a valley of its own."""

@@ -16,11 +16,12 @@ from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.measures import TRIED
 from stiction_ros.discrepancy.steps.look import look_on, scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import Keys, best_whole, mended, singles
+from stiction_ros.discrepancy.steps.wholes import best_whole, mended
 from stiction_ros.effects import Backlash, StepDisturbance, about
 
 CANCEL = 0.25  # of the larger one, that two opposite steps may leave
 NEAR = 40.0  # evidence, by which a rival may be behind beside figures that were fitted without it
+Keys = tuple[tuple[str, str], ...]  # places and effects
 
 
 def settle(task: Task, state: State) -> State:
@@ -33,9 +34,8 @@ def settle(task: Task, state: State) -> State:
 
 
 def best_of_wholes(task: Task, state: State) -> State:
-    """Keep the best whole explanation: a part of what was found, or one effect alone."""
-    alone = [each for each in singles(state) if confirmed(each.fit)]
-    best = best_whole(state.now, alone, task.options.margin)
+    """Keep the best whole explanation: what was found, or a part of it."""
+    best = best_whole(state.now, task.options.margin)
     kept = without_slips(best.effects)
     return dataclasses.replace(
         state, now=best.refitted(kept) if len(kept) < len(best.effects) else best

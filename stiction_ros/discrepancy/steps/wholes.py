@@ -3,14 +3,11 @@
 import dataclasses
 import itertools
 from collections.abc import Sequence
-from typing import NamedTuple
 
-from stiction_ros.discrepancy.decision.decide import large_enough, on_the_way
+from stiction_ros.discrepancy.decision.decide import large_enough
 from stiction_ros.discrepancy.decision.explanation import AddedEffect, Explanation, ProcessChange
 from stiction_ros.discrepancy.decision.scores import Scores
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.measure import spans_steps
-from stiction_ros.discrepancy.gap.noise_effects import noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.measures import TRIED
 from stiction_ros.discrepancy.process.change import changed_process
@@ -19,84 +16,32 @@ from stiction_ros.discrepancy.steps.state import State, Task
 INEXACT = 0.01
 """Share of what all effects gain that each has to gain beside the margin: no plant obeys a law to
 the letter, and what the law misses weighs the more the more it explains."""
-LAWS = 100.0  # BIC that a law of the noise may gain over an autoregression
-Keys = tuple[tuple[str, str], ...]
 
 
-class ToldNoise(NamedTuple):
-    """An explanation whose larger noise is told by laws, where that is better."""
+def best_whole(now: Explanation, margin: float) -> Explanation:
+    """Return the best of all subsets of what was found, one effect after the other.
 
-    whole: Explanation
-    gained: float  # −2 log likelihood that the laws gain
-    laws: Keys  # their places and effects
-
-    def worth(self, margin: float) -> float:
-        """Return what is to be least."""
-        return self.whole.worth(margin) - self.gained
-
-
-def with_laws(whole: Explanation) -> ToldNoise:
-    """Return an explanation with its larger noise told by laws, where that is better."""
-    gained, names = 0.0, []
-    base = whole.base
-    declared = declared_noise(base.run.model)
-    for i, (fit, own) in enumerate(zip(base.noise, declared, strict=True)):
-        if own is None or not fit.enlarged or not spans_steps(base, i):
-            continue
-        laws = noise_effects(base, i, own)
-        if laws and (more := fit.bic(0) + fit.held_minus_two_log - laws[0].score) > 0.0:
-            gained += more
-            names.append((laws[0].place, laws[0].behaviour.effect))
-    return ToldNoise(whole, gained, tuple(names))
-
-
-def best_whole(now: Explanation, singles: Sequence[AddedEffect], margin: float) -> Explanation:
-    """Return the best of all subsets of what was found, and of single effects in its stead.
-
-    Args:
-        now: what was found, one effect after the other.
-        singles: effects of the first look that may explain alone what took several.
-        margin: that every further effect has to gain, beside a share of what all gain.
+    Every further effect has to gain the margin, beside a share of what all gain. A single effect
+    that takes the place of several is in doubt with those that explain as much alone.
     """
-    tried, price, added = [now], margin, now.effects
-    if added:
-        tried.append(now.holding(()))
+    added = now.effects
+    if not added:
+        return now
+    tried, price = [now, now.holding(())], margin
     if len(added) > 1:
         price += INEXACT * max(tried[1].score - tried[0].score, 0.0)
         for count in range(1, len(added)):
             tried += [now.refitted(part) for part in itertools.combinations(added, count)]
-        known = {each.fit.candidate.key for each in added}
-        others = [each for each in singles if each.fit.candidate.key not in known][:TRIED]
-        tried += [now.holding([alone]) for alone in others]
-    least = min(each.worth(price) for each in tried)
-    loads = not any(on_the_way(each.place, each.effect) for each in added)
-    near = [
-        with_laws(each)
-        for each in tried
-        if each.worth(price) < least + LAWS or (loads and not each.effects)
-    ]
-    best = min(near, key=lambda each: each.worth(price))
-    alone = [each for each in near if len(each.whole.effects) == 1]
-    close = [each for each in alone if each.worth(margin) < best.worth(margin) + margin]
-    if not best.whole.effects and best.laws:
-        # A noise bends as it has to; an effect of few figures that leaves no more is not taken
-        # back for it.
-        close = [each for each in close if not any(fit.enlarged for fit in each.whole.base.noise)]
-        rival = min(close, key=lambda each: each.worth(margin), default=None)
-        return best.whole if rival is None else _in_doubt(rival.whole, best.laws)
-    if len(best.whole.effects) != 1 or len(added) < 2:
-        return best.whole
-    keys = [key for each in close for key in each.whole.effects[0].fit.candidate.keys]
-    return _in_doubt(best.whole, keys)
-
-
-def _in_doubt(whole: Explanation, rivals: Sequence[tuple[str, str]]) -> Explanation:
-    """Return one effect with the rivals that explain as much alone."""
-    (effect,) = whole.effects
-    own = (effect.place, effect.effect)
-    names = dict.fromkeys([*effect.alternatives, *rivals])
-    others = tuple(name for name in names if name != own)
-    return dataclasses.replace(whole, effects=(dataclasses.replace(effect, alternatives=others),))
+    best = min(tried, key=lambda each: each.worth(price))
+    if len(best.effects) != 1 or len(added) < 2:
+        return best
+    most = best.worth(margin) + margin
+    close = [each for each in tried if len(each.effects) == 1 and each.worth(margin) < most]
+    (effect,) = best.effects
+    keys = [key for each in close for key in each.effects[0].fit.candidate.keys]
+    names = dict.fromkeys([*effect.alternatives, *keys])
+    others = tuple(name for name in names if name != (effect.place, effect.effect))
+    return dataclasses.replace(best, effects=(dataclasses.replace(effect, alternatives=others),))
 
 
 def suspicious(base: Baseline) -> bool:
