@@ -198,7 +198,7 @@ def liveliest(record: Record) -> Record:
     """
     begin, end = 0, len(record)
     if len(record) > PART:
-        begin = liveliest_begin((record.op / np.ptp(record.op, axis=0)).T)
+        begin = liveliest_begin((record.op / np.ptp(record.op, axis=0)).T, PART)
         end = begin + PART
     part = record.part(begin, end)
     _, first = refresh(part)

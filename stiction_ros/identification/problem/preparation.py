@@ -58,11 +58,11 @@ def liveliest_part(data: Data) -> Data:
     samples = data.u.shape[1]
     if samples <= PART:
         return data
-    begin = liveliest_begin(data.u / data.u.std(axis=1, keepdims=True))
+    begin = liveliest_begin(data.u / data.u.std(axis=1, keepdims=True), PART)
     return data.part(begin, begin + PART)
 
 
-def liveliest_begin(op: FloatArray, count: int = PART) -> int:
+def liveliest_begin(op: FloatArray, count: int) -> int:
     """Return where the ``count`` samples begin in which OP, scaled, shape (m, N), moves most."""
     samples = op.shape[1]
     begins = np.linspace(0, samples - count, 2 * (samples // count) + 1).astype(int)
