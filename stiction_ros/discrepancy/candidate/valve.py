@@ -127,35 +127,38 @@ class StictionCandidate(ValveCandidate):
     def leaps(self, point: FloatArray) -> bool:
         return float(1.0 - point[1]) >= LEAST_JUMP * float(1.0 + point[1])
 
-    def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
-        """Return points, shape (G, axes), in a box around one, with any start of the stem.
+    def of_cube(self, cubes: FloatArray) -> FloatArray:
+        """Return points for shares, shape (G, axes), of all sums, jumps and starts.
 
-        It is a box in the sum of the frictions and their difference, the jump. The sum, how far OP
-        goes back before the stem follows, is told well by any record; the jump much less.
+        The sum of the frictions, how far OP goes back before the stem follows, is told well by any
+        record; their difference, the jump, much less.
+        """
+        low, high = self.axes[0].low, self.axes[0].high
+        totals = 2.0 * low * (high / low) ** cubes[:, 0]
+        static = np.clip(0.5 * totals * (1.0 + cubes[:, 1]), low, high)
+        ratios = (1.0 - cubes[:, 1]) / (1.0 + cubes[:, 1])
+        return np.column_stack([static, ratios, 2.0 * cubes[:, 2] - 1.0])
+
+    def box(self, point: FloatArray, cubes: FloatArray, size: float) -> FloatArray:
+        """Return points in a box around one, with any start of the stem.
 
         Args:
             point: values, shape (axes,).
-            cube: points between −1 and 1, shape (G, axes).
+            cubes: points between 0 and 1, shape (G, axes).
             size: of the box, 1 for the largest.
         """
-        total, jump = point[0] * (1.0 + point[1]), point[0] * (1.0 - point[1])
-        totals = total * np.exp(SUM_BOX * size * cube[:, 0])
-        jumps = np.clip(jump + JUMP_BOX * total * size * cube[:, 1], 0.0, totals)
-        return self._points(totals, jumps, cube[:, 2])
+        span = math.log(self.axes[0].high / self.axes[0].low)
+        around = size * np.array([SUM_BOX / span, JUMP_BOX]) * (2.0 * cubes[:, :2] - 1.0)
+        near = np.clip(self.cube(point)[:2] + around, 0.0, 1.0)
+        return self.of_cube(np.column_stack([near, cubes[:, 2]]))
 
-    def along(self, point: FloatArray, cube: FloatArray) -> FloatArray:
-        """Return points, shape (G, axes), of about the same sum, with any jump and any start."""
-        totals = math.exp(self.valley(point)) * np.exp(SUM_BOX * cube[:, 0])
-        return self._points(totals, 0.5 * totals * (1.0 + cube[:, 1]), cube[:, 2])
-
-    def valley(self, point: FloatArray) -> float:
-        """Return the logarithm of the sum of the frictions, by which valleys differ."""
-        return math.log(float(point[0] * (1.0 + point[1])))
-
-    def _points(self, totals: FloatArray, jumps: FloatArray, leads: FloatArray) -> FloatArray:
-        low, high = self.axes[0].low, self.axes[0].high
-        static = np.clip(0.5 * (totals + jumps), low, high)
-        return np.column_stack([static, (totals - jumps) / (totals + jumps), leads])
+    def cube(self, point: FloatArray) -> FloatArray:
+        """Return what :meth:`of_cube` makes a point of, shape (axes,)."""
+        (static, ratio, lead), (low, high) = point, (self.axes[0].low, self.axes[0].high)
+        total = math.log(0.5 * static * (1.0 + ratio) / low, high / low)
+        return np.asarray(
+            np.clip([total, (1.0 - ratio) / (1.0 + ratio), 0.5 * (lead + 1.0)], 0.0, 1.0)
+        )
 
 
 class OneFigure(ValveCandidate):

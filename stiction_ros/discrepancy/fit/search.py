@@ -25,12 +25,11 @@ from stiction_ros.effects import Behaviour, FloatArray
 LEADERS = 4  # points that are looked at further, under each guess of the noise
 MOMENTS = 241
 REACH = 4.0  # points of the first grid, wider than a held-out block
-SLOW, SLOWER = np.array([0.8]), np.array([0.95])
+SLOW = np.array([0.8])
 SHRINK = 0.4
-VALLEYS, WIDE = 3, 0.15  # of a needle, that are searched over their whole length; in logarithms
-ALONG = 2000  # points in each
-BOXES, STROKES = (1.0, 0.3, 0.1, 0.03, 0.01), 2  # of the largest, and how often each is filled
-THROWN = 3000  # points in a box
+BRED, GENERATIONS = 300, 40  # points of a needle, and how often they breed
+BOXES = tuple(0.6**k for k in range(10))  # around the best point, of the largest
+THROWN = 1500  # points in a box
 GAP_SEARCH_ROUNDS = 5
 FAIR = 3  # rounds after which a start that is surely behind is given up
 POLISHES = 8
@@ -88,7 +87,7 @@ def fit_candidate(
         for ar, centre in search.blurred():
             search.refine(centre, 0.7, ar)
     if candidate.needle and around is None and search.best().delta_bic > 0.0:
-        search.scatter()
+        search.breed()
     if candidate.dated:
         if len(candidate.axes) > 1:
             search.polish()
@@ -208,40 +207,54 @@ class _Search:
         assert isinstance(self.candidate, StictionCandidate)
         return self.candidate
 
-    def scatter(self) -> None:
-        """Search scattered points along the best valleys, then in ever smaller boxes.
+    def breed(self) -> None:
+        """Search all figures of a needle by differential evolution, then in ever smaller boxes.
 
         The optimum of He's law is a needle in a valley: stems that differ in one slip differ
-        for long. Points of a lattice miss it however fine they are along the valley. It is looked
-        for over the whole length of the best valleys first, as far from it nothing leads there;
-        then around the best point, in each box while it gains. The start of a stem is left open in
-        all of them: one that is wrong hides the rest.
+        for long. Points of a lattice miss it however fine they are along the valley, and far from
+        it nothing leads there. The boxes are around the best point so far; the start of a stem is
+        left open in all of them: one that is wrong hides the rest.
         """
+        from scipy.optimize import differential_evolution
+
         halton = halton_sequence(len(self.candidate.axes), seed=0)
-        for fit in self._valleys():
-            values = self.needle.along(fit.point, 2.0 * halton.random(ALONG) - 1.0)
+        white = dict.fromkeys(range(len(self.base.noise)), NO_MEMORY)
+        for blurred in (True, False):
+            under = white if blurred else self._searched(self.found)
+            leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:LEADERS]
+            first = halton.random(BRED)
+            first[: len(leading)] = [self.needle.cube(fit.point) for fit in leading]
+            found = differential_evolution(
+                self._loss,
+                [(0.0, 1.0)] * len(self.candidate.axes),
+                args=(under,),
+                strategy="rand1bin",
+                init=first,
+                maxiter=GENERATIONS,
+                tol=0.0,
+                seed=0,
+                polish=False,
+                updating="deferred",
+                vectorized=True,
+            )
+            best = self.needle.of_cube(found.x[None, :])
+            self.judge(best[0], self.candidate.respond(self.base.run, best))
+        for size in BOXES:
+            fit = self.best()
+            values = self.needle.box(fit.point, halton.random(THROWN), size)
             response = self.candidate.respond(self.base.run, values)
-            for ar in (NO_MEMORY, SLOWER, self.base.noise[0].searched):
-                squares = misfit(self.base, self.gap, response, dict.fromkeys(response.outputs, ar))
-                for k in np.argsort(squares)[:LEADERS].tolist():
-                    self.judge(values[k], response.pick(k))
-        for size, _ in itertools.product(BOXES, range(STROKES)):
-            best = self.best()
-            values = self.needle.scattered(best.point, 2.0 * halton.random(THROWN) - 1.0, size)
-            response = self.candidate.respond(self.base.run, values)
-            self.best_of(values, response, [best.noise, self.base.noise])
+            self.best_of(values, response, [fit.noise, self.base.noise])
             self._judge_best(values, response, dict.fromkeys(response.outputs, NO_MEMORY))
 
-    def _valleys(self) -> list[CandidateFit]:
-        """Return the best fits so far, each in a valley of its own."""
-        found: list[CandidateFit] = []
-        for fit in sorted(self.judged.values(), key=lambda fit: -fit.delta_bic):
-            own = self.needle.valley(fit.point)
-            if all(abs(own - self.needle.valley(each.point)) > WIDE for each in found):
-                found.append(fit)
-            if len(found) == VALLEYS:
-                break
-        return found
+    def _loss(self, cubes: FloatArray, under: Under) -> FloatArray:
+        """Return the misfit of points of the cube of all figures, shape (axes, G), under φ."""
+        values = self.needle.of_cube(cubes.T)
+        return misfit(self.base, self.gap, self.candidate.respond(self.base.run, values), under)
+
+    def _searched(self, like: CandidateFit | None) -> dict[int, FloatArray]:
+        """Return φ under which points are compared: of a fit, where it has any."""
+        own = dict(enumerate(self.base.noise)) | dict({} if like is None else like.noise)
+        return {i: noise.searched for i, noise in own.items()}
 
     def best(self) -> CandidateFit:
         """Return the best fit that was seen."""
@@ -271,10 +284,7 @@ class _Search:
         self, coordinates: FloatArray, like: CandidateFit | None = None, under: Under | None = None
     ) -> tuple[FloatArray, CandidateFit]:
         """Judge the point of a grid that is best under the noise of another fit, or a given one."""
-        ar = {i: noise.searched for i, noise in enumerate(self.base.noise)}
-        if like is not None:
-            ar |= {i: noise.searched for i, noise in like.noise.items()}
-        ar |= under or {}
+        ar = self._searched(like) | dict(under or {})
         coordinates = settled(self.base, self.gap, self.candidate, coordinates, ar)
         values = self.candidate.values(coordinates)
         response = self.candidate.respond(self.base.run, values)
