@@ -8,11 +8,11 @@ import numpy as np
 
 from stiction_ros.control.belief import ValveBeliefs, jump_form
 from stiction_ros.control.certificate import FreeJumps
-from stiction_ros.control.embedding_problem import EmbeddingProblem, JumpPattern, StickyState
 from stiction_ros.control.formulation import Formulation
 from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonWeights
 from stiction_ros.control.horizon_qp import HorizonSolution
 from stiction_ros.control.pattern_bounds import PatternBounds
+from stiction_ros.control.pattern_problem import JumpPattern, PatternProblem, StickyState
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.control.target import Target
 from stiction_ros.control.unaware import predicted_outputs
@@ -121,7 +121,7 @@ class EmbeddingMpc(Formulation):
             for combination in itertools.product(*choices)
             if all(p is None or p.wait + p.second < weights.horizon for p in combination)
         )
-        self._problems = tuple(EmbeddingProblem(self.cost, limits, one) for one in combinations)
+        self._problems = tuple(PatternProblem(self.cost, limits, one) for one in combinations)
         self._jumps = np.array([problem.jumps for problem in self._problems], dtype=float)
         self._bounds = PatternBounds(self.cost, combinations)
         self.solved = 0
@@ -239,9 +239,8 @@ class EmbeddingMpc(Formulation):
         self, state: FloatArray, target: Target, last: FloatArray, samples: int
     ) -> float | None:
         """Return the least cost of any jumps in the first samples, None where it is not found."""
-        sticky = [form is not None for form in self.forms]
-        price = self.tuning.jump_price
-        free = FreeJumps(self.cost, self.limits, self.valves(last), sticky, price, samples)
+        valves, price = self.valves(last), self.tuning.jump_price
+        free = FreeJumps(self.cost, self.limits, valves, self._sticky, price, samples)
         return free.optimum(state, target)
 
     def op_of(self, last: FloatArray, stem: FloatArray) -> FloatArray:

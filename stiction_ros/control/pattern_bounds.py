@@ -4,11 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.control.embedding_problem import JumpPattern, StickyState
 from stiction_ros.control.horizon import HorizonCost
+from stiction_ros.control.pattern_problem import Combination, StickyState
 from stiction_ros.effects.behaviour import FloatArray
-
-Combination = tuple[JumpPattern | None, ...]
 
 
 class PatternBounds:
@@ -32,7 +30,15 @@ class PatternBounds:
 
         width, horizon = len(combinations[0]), cost.horizon
         healthy = np.array([pattern is None for pattern in combinations[0]])
-        jumps = [_jumps(combination) for combination in combinations]
+        # Valve, sample, sign and kind of each jump: 0 first jump up, 1 first one down, 2 later.
+        jumps = [
+            [
+                (j, at, sign, 2 if number else int(sign < 0))
+                for j, pattern in enumerate(combination)
+                for number, (at, sign) in enumerate(pattern.jumps if pattern else ())
+            ]
+            for combination in combinations
+        ]
         columns = sorted({(j, at) for found in jumps for j, at, _, _ in found})
         steps = np.zeros((horizon, width, len(columns)))
         for c, (j, at) in enumerate(columns):
@@ -49,17 +55,14 @@ class PatternBounds:
         self._whole = basis.T @ curved - curved[moved].T @ gains
         self._free = np.linalg.inv(np.linalg.cholesky(free))
         self._moved, self._count = moved, len(columns)
-        size = max((len(found) for found in jumps), default=0)
-        shape = (len(combinations), max(size, 1))
-        self._columns, self._signs = np.zeros(shape, dtype=np.int64), np.zeros(shape)
-        self._valves = np.zeros(shape, dtype=np.int64)
-        self._kinds = np.zeros(shape, dtype=np.int64)  # 0 first jump up, 1 first one down, 2 later
         self._counts = np.array([len(found) for found in jumps], dtype=np.int64)
+        shape = (len(combinations), max(int(self._counts.max()), 1))
+        self._columns, self._signs = np.zeros(shape, dtype=np.int64), np.zeros(shape)
+        self._valves, self._kinds = (np.zeros(shape, dtype=np.int64) for _ in range(2))
         for p, found in enumerate(jumps):
-            for k, (j, at, sign, first) in enumerate(found):
+            for k, (j, at, sign, kind) in enumerate(found):
                 self._columns[p, k], self._signs[p, k] = columns.index((j, at)), sign
-                self._valves[p, k] = j
-                self._kinds[p, k] = 2 if not first else int(sign < 0)
+                self._valves[p, k], self._kinds[p, k] = j, kind
         self._box_bounds = box_bounds
         self._bounds(np.zeros(self._count), np.zeros(shape), np.ones(shape))
 
@@ -69,7 +72,7 @@ class PatternBounds:
         c, whole = self._count, self._whole
         base = deviation @ (0.5 * whole[c:, c:] @ deviation + linear[c:])
         relaxed = self._free @ gradient[self._moved]
-        least, largest = jump_sizes(valves)
+        least, largest = valves.jump_sizes
         found = self._bounds(
             linear[:c] + whole[:c, c:] @ deviation,
             least[self._valves, self._kinds],
@@ -81,26 +84,3 @@ class PatternBounds:
         hessian = np.ascontiguousarray(self._whole[: self._count, : self._count])
         jumps = (self._columns, self._signs, self._counts)
         return self._box_bounds(hessian, linear, jumps, (least, largest))
-
-
-def jump_sizes(valves: StickyState) -> tuple[FloatArray, FloatArray]:
-    """Return least and largest jump, shape (m, 3) each, %: first one up, first one down, later.
-
-    The first must happen from wherever the stem may be.
-    """
-    least = np.column_stack([valves.least] * 3)
-    least[:, 0] += valves.interval[:, 1] - valves.last
-    least[:, 1] += valves.last - valves.interval[:, 0]
-    return least, np.maximum(valves.largest[:, None], least)
-
-
-def _jumps(combination: Combination) -> list[tuple[int, int, int, bool]]:
-    """Return (valve, sample, sign, whether it is its first) of each jump."""
-    found = []
-    for j, pattern in enumerate(combination):
-        if pattern is None or not pattern.jumps:
-            continue
-        found.append((j, pattern.wait, pattern.direction, True))
-        if pattern.second:
-            found.append((j, pattern.wait + pattern.second, -pattern.direction, False))
-    return found

@@ -8,7 +8,8 @@ import numpy as np
 from stiction_ros.control.belief import ValveBeliefs, jump_form
 from stiction_ros.control.formulation import Formulation
 from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonWeights
-from stiction_ros.control.horizon_qp import HorizonQp, HorizonSolution
+from stiction_ros.control.horizon_qp import HorizonSolution
+from stiction_ros.control.pattern_problem import PatternProblem, StickyState
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.control.target import Target
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
@@ -25,16 +26,7 @@ class UnawareMpc(Formulation):
         """Condense the problem; limits as in :class:`HorizonLimits`."""
         self.limits = limits
         self.cost = HorizonCost(model, weights)
-        m = model.b.shape[1]
-        size = weights.horizon * m
-        limited = np.flatnonzero(np.isfinite(limits.move))
-        picks = (np.arange(weights.horizon)[:, None] * m + limited).reshape(-1)
-        self._limited, self._width = limited, m
-        rows = (np.eye(size) - np.eye(size, k=-m))[picks]
-        self._qp = HorizonQp(self.cost, np.eye(size), rows, limits.output, limits.iterations)
-        self._size = size
-        self._lower, self._upper = np.empty(size + len(picks)), np.empty(size + len(picks))
-        self._moves = np.tile(limits.move[limited], weights.horizon)
+        self._problem = PatternProblem(self.cost, limits, (None,) * model.b.shape[1])
 
     def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
         """Return the best plan from state ξ̂ (n,) and the last stems (m,), or None.
@@ -42,16 +34,14 @@ class UnawareMpc(Formulation):
         Out of iterations, the plan without bounds is cut to them, and returned if it is
         cheaper than leaving the stems where they are.
         """
-        low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
-        deviation = last - target.stem
-        self._fill_bounds(low - target.stem, high - target.stem, deviation)
-        z = state - target.state
-        gradient = self.cost.linear(z, deviation, target.path)
-        solution = self._qp.solve(z, gradient, self._lower, self._upper, target.pv)
+        none = np.zeros_like(last)
+        valves = StickyState(last, np.column_stack([last, last]), none, none, none)
+        solution = self._problem.solve(state, target, valves)
         if solution is not None:
-            cost = solution.cost + self.cost.constant(z, deviation, target.path)
+            z, before = state - target.state, last - target.stem
+            cost = solution.cost + self.cost.constant(z, before, target.path)
             return self._plan(state, target, solution, cost)
-        if self._qp.limit_reached:
+        if self._problem.qp.limit_reached:
             return self._cut_plan(state, target, last)
         return None
 
@@ -84,24 +74,15 @@ class UnawareMpc(Formulation):
         stay = np.tile(np.clip(before, low, high), (self.cost.horizon, 1))
         both = []
         for plan in (cut, stay):
-            v, slack = plan.reshape(-1), self._qp.slack(z, plan, target.pv)
+            v, slack = plan.reshape(-1), self._problem.qp.slack(z, plan, target.pv)
             cost = float(v @ (0.5 * self.cost.hessian @ v + linear))
-            cost = cost + self.cost.constant(z, before, target.path) + self._qp.slack_cost(slack)
+            cost += self.cost.constant(z, before, target.path)
+            cost += self._problem.qp.slack_cost(slack)
             found = HorizonSolution(plan, cost, slack)
             both.append(self._plan(state, target, found, cost, converged=False))
         if not np.isfinite(both[0].cost) or both[0].cost > both[1].cost:
             return None
         return both[0]
-
-    def _fill_bounds(self, low: FloatArray, high: FloatArray, deviation: FloatArray) -> None:
-        """Write bounds on all stems off the target, then on their limited moves."""
-        size, count = self._size, len(self._limited)
-        self._lower[:size].reshape(-1, self._width)[:] = low
-        self._upper[:size].reshape(-1, self._width)[:] = high
-        if count:
-            self._lower[size:], self._upper[size:] = -self._moves, self._moves
-            self._lower[size : size + count] += deviation[self._limited]
-            self._upper[size : size + count] += deviation[self._limited]
 
 
 def predicted_outputs(

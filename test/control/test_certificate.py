@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from loops import INF, first_order, limits_for, stable_model, target_at, weights_for
 
 from stiction_ros.control.embedding import EmbeddingMpc, EmbeddingTuning
-from stiction_ros.control.embedding_problem import EmbeddingProblem, JumpPattern
+from stiction_ros.control.pattern_problem import JumpPattern, PatternProblem
 from stiction_ros.control.result import Plan
 from stiction_ros.control.target import Target
 from stiction_ros.effects import HeStiction
@@ -158,7 +158,7 @@ def test_the_patterns_of_the_problem_are_those_of_the_certificate() -> None:
     mpc, state, target, last = situation(4, 1)
     costs = []
     for direction in (-1, 0, 1):
-        problem = EmbeddingProblem(mpc.cost, mpc.limits, (JumpPattern(direction),))
+        problem = PatternProblem(mpc.cost, mpc.limits, (JumpPattern(direction),))
         solution = problem.solve(state, target, mpc.valves(last))
         if solution is not None:
             costs.append(solution.cost + TUNING.jump_price * problem.jumps)

@@ -9,7 +9,6 @@ from loops import stable_model, target_at, weights_for
 from stiction_ros.control.box_bounds import box_bounds
 from stiction_ros.control.embedding import EmbeddingMpc, EmbeddingTuning
 from stiction_ros.control.horizon import HorizonLimits
-from stiction_ros.control.pattern_bounds import jump_sizes
 from stiction_ros.control.target import Target
 from stiction_ros.effects import HeStiction
 
@@ -111,6 +110,6 @@ def test_the_first_jump_reaches_from_wherever_the_stem_may_be() -> None:
     mpc, _, _, last = problem(3, 1, 1, bounded=False)
     mpc.know(mpc.forms, None, np.column_stack([last - 2.0, last + 3.0]))
     valves = mpc.valves(last)
-    least, largest = jump_sizes(valves)
+    least, largest = valves.jump_sizes
     assert least[0] == pytest.approx(valves.least[0] + np.array([3.0, 2.0, 0.0]))
     assert (largest >= least).all()

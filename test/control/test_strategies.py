@@ -213,7 +213,7 @@ def test_after_a_failure_the_solver_starts_anew() -> None:
     it = MpcController(
         design_of(model, limits, weights_for(model, 20), kalman(1)), ControlMode.UNAWARE
     )
-    qp = it._formulation._qp  # type: ignore[union-attr]
+    qp = it._formulation._problem.qp  # type: ignore[union-attr]
     it.step(PV, np.array([24.9]), NO_DV, np.array([50.0]))
     assert qp.limit_reached
     assert not qp._hard._ready
