@@ -18,7 +18,6 @@ Pairs = Sequence[tuple[int, RecoveredController]]
 """Per valve the output of its controller, −1 for none, and the controller."""
 
 BEYOND = 1e6  # times the size of a start from which on a run is taken as gone
-LANES = 8  # runs that go side by side: as many as a vector of the processor or two hold
 
 
 class Process(NamedTuple):
@@ -99,22 +98,12 @@ def command(
 
 
 @compiled
-def _in_lanes(values: FloatArray, first: int, by_lane: FloatArray) -> None:
-    """Copy runs from ``first`` on, shape (R, n, q), side by side, shape (n, q, LANES)."""
-    for lane in range(LANES):
-        run = min(first + lane, len(values) - 1)
-        for k in range(values.shape[1]):
-            for i in range(values.shape[2]):
-                by_lane[k, i, lane] = values[run, k, i]
-
-
-@compiled
 def run_loops(
     process: Process, controllers: Controllers, runs: Runs, sp: FloatArray, load: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return OP, shape (R, n, m), and PV, shape (R, n, p).
 
-    Several runs go side by side, each computed as it would be alone.
+    All runs go side by side, each computed as it would be alone.
 
     Args:
         process: of all runs.
@@ -127,107 +116,90 @@ def run_loops(
     number, past, outputs = runs.pv.shape
     valves, whole = runs.stem.shape[2], sp.shape[1]
     na, nb = process.a.shape[1], process.b.shape[2]
-    op_rows = np.full((number, whole - past, valves), np.inf)
-    pv_rows = np.full((number, whole - past, outputs), np.inf)
-    y, stem = np.empty((whole, outputs, LANES)), np.empty((whole, valves, LANES))
-    wanted, added = np.empty((whole, outputs, LANES)), np.empty((whole, outputs, LANES))
-    u, error = np.empty((valves, LANES)), np.zeros((valves, 2, LANES))
-    friction, tuning = np.empty((valves, 2, LANES)), np.empty((valves, 3, LANES))
-    value, bound, memory = np.empty(LANES), np.empty(LANES), np.zeros((valves, 6, LANES))
-    ends = np.empty((valves, 2, LANES))
-    op, gone = np.empty((whole, valves, LANES)), np.empty(LANES, dtype=np.int64)
-    for first in range(0, number, LANES):
-        _in_lanes(runs.pv, first, y)
-        _in_lanes(runs.stem, first, stem)
-        _in_lanes(runs.friction, first, friction)
-        _in_lanes(runs.tuning, first, tuning)
-        _in_lanes(sp, first, wanted)
-        _in_lanes(load, first, added)
+    y, stem = np.empty((whole, outputs, number)), np.empty((whole, valves, number))
+    y[:past], stem[:past] = runs.pv.transpose(1, 2, 0), runs.stem.transpose(1, 2, 0)
+    wanted = np.ascontiguousarray(sp.transpose(1, 2, 0))
+    added = np.ascontiguousarray(load.transpose(1, 2, 0))
+    friction = np.ascontiguousarray(runs.friction.transpose(1, 2, 0))
+    tuning = np.ascontiguousarray(runs.tuning.transpose(1, 2, 0))
+    u, error = np.ascontiguousarray(runs.op.T), np.zeros((valves, 2, number))
+    ends, memory = np.empty((valves, 2, number)), np.zeros((valves, 6, number))
+    value, bound = np.empty(number), np.empty(number)
+    op, gone = np.empty((whole, valves, number)), np.zeros(number, dtype=np.int64)
+    for run in range(number):
+        bound[run] = BEYOND * max(1.0, np.abs(y[:past, :, run]).max())
         for j in range(valves):
-            ends[j, 0] = friction[j, 0] + friction[j, 1]
-            ends[j, 1] = friction[j, 0] - friction[j, 1]
-        for lane in range(LANES):
-            run = min(first + lane, number - 1)
-            size = 1.0
-            for k in range(past):
-                for i in range(outputs):
-                    size = max(size, abs(y[k, i, lane]))
-            bound[lane], gone[lane] = BEYOND * size, 0
+            ends[j, 0, run] = friction[j, 0, run] + friction[j, 1, run]
+            ends[j, 1, run] = friction[j, 0, run] - friction[j, 1, run]
+            at = stem[past - 1, j, run]
+            way = np.sign(at - stem[past - 2, j, run])  # it moves on, or rests
+            memory[j, 0, run], memory[j, 3, run] = at, at
+            memory[j, 1, run], memory[j, 2, run] = u[j, run], way
+            memory[j, 4:, run] = friction[j, 0, run] if way == 0.0 else -1.0
+            i = controllers.output[j]
+            if i >= 0:
+                late = past - 1 - controllers.lag[j]
+                share = controllers.smoothing[j]
+                e = wanted[late - 2, i, run] - y[late - 2, i, run] - added[late - 2, i, run]
+                for k in range(late - 2, late + 1):
+                    away = wanted[k, i, run] - y[k, i, run] - added[k, i, run]
+                    e = share * e + (1.0 - share) * away
+                    error[j, 1, run] = error[j, 0, run]
+                    error[j, 0, run] = e
+    for k in range(past, whole):
+        for i in range(outputs):
+            for run in range(number):
+                value[run] = process.bias[i]
+            for lag in range(na):
+                factor = process.a[i, lag]
+                for run in range(number):
+                    value[run] -= factor * y[k - 1 - lag, i, run]
             for j in range(valves):
-                u[j, lane] = runs.op[run, j]
-                at = stem[past - 1, j, lane]
-                way = np.sign(at - stem[past - 2, j, lane])  # it moves on, or rests
-                memory[j, 0, lane], memory[j, 3, lane] = at, at
-                memory[j, 1, lane], memory[j, 2, lane] = u[j, lane], way
-                memory[j, 4:, lane] = friction[j, 0, lane] if way == 0.0 else -1.0
-                i = controllers.output[j]
-                if i >= 0:
-                    late = past - 1 - controllers.lag[j]
-                    share = controllers.smoothing[j]
-                    e = wanted[late - 2, i, lane] - y[late - 2, i, lane] - added[late - 2, i, lane]
-                    for k in range(late - 2, late + 1):
-                        away = wanted[k, i, lane] - y[k, i, lane] - added[k, i, lane]
-                        e = share * e + (1.0 - share) * away
-                        error[j, 1, lane] = error[j, 0, lane]
-                        error[j, 0, lane] = e
-        for k in range(past, whole):
-            for i in range(outputs):
-                for lane in range(LANES):
-                    value[lane] = process.bias[i]
-                for lag in range(na):
-                    factor = process.a[i, lag]
-                    for lane in range(LANES):
-                        value[lane] -= factor * y[k - 1 - lag, i, lane]
-                for j in range(valves):
-                    shift = k - 1 - process.delay[i, j]
-                    for lag in range(nb):
-                        factor = process.b[i, j, lag]
-                        for lane in range(LANES):
-                            value[lane] += factor * stem[shift - lag, j, lane]
-                for lane in range(LANES):
-                    y[k, i, lane] = value[lane]
-                    if gone[lane] == 0 and not abs(value[lane]) < bound[lane]:
-                        gone[lane] = k
-            for j in range(valves):
-                i = controllers.output[j]
-                if i >= 0:
-                    late, share = k - controllers.lag[j], controllers.smoothing[j]
-                    low, high = controllers.low[j], controllers.high[j]
-                    for lane in range(LANES):
-                        value[lane] = (
-                            wanted[late, i, lane] - y[late, i, lane] - added[late, i, lane]
-                        )
-                    command(u[j], error[j], tuning[j], value, share, low, high)
-                follows, slopes, factor = runs.laws[j, 0], runs.laws[j, 1], runs.laws[j, 2]
-                if slopes:
-                    slope_step(memory[j], u[j], friction[j, 1], ends[j])
-                for lane in range(LANES):
-                    op[k, j, lane] = u[j, lane]
-                    apart = u[j, lane] - stem[k - 1, j, lane]
-                    still = abs(apart) <= friction[j, 0, lane]
-                    slip = -friction[j, 1, lane] if apart > 0.0 else friction[j, 1, lane]
-                    if follows:
-                        goes_on = memory[j, 2, lane] * (u[j, lane] - memory[j, 1, lane]) > 0.0
-                        if not goes_on:
-                            memory[j, 2, lane] = 0.0 if still else np.sign(apart)
-                        still = still and not goes_on
-                        slip = -memory[j, 2, lane] * friction[j, 1, lane]
-                        memory[j, 1, lane] = u[j, lane]
-                    slipped = u[j, lane] + slip
-                    if factor != 1.0 and friction[j, 0, lane] > 0.0:
-                        slipped = stem[k - 1, j, lane] + factor * (apart + slip)
-                    stem[k, j, lane] = stem[k - 1, j, lane] if still else slipped
-                    if slopes and friction[j, 0, lane] > 0.0:
-                        stem[k, j, lane] = memory[j, 0, lane]
-        for lane in range(min(LANES, number - first)):
-            until = whole if gone[lane] == 0 else gone[lane] + 1
-            for i in range(outputs):
-                for k in range(past, until):
-                    pv_rows[first + lane, k - past, i] = y[k, i, lane] + added[k, i, lane]
-            for j in range(valves):
-                for k in range(past, until):
-                    op_rows[first + lane, k - past, j] = op[k, j, lane]
-    return op_rows, pv_rows
+                shift = k - 1 - process.delay[i, j]
+                for lag in range(nb):
+                    factor = process.b[i, j, lag]
+                    for run in range(number):
+                        value[run] += factor * stem[shift - lag, j, run]
+            for run in range(number):
+                y[k, i, run] = value[run]
+                if gone[run] == 0 and not abs(value[run]) < bound[run]:
+                    gone[run] = k
+        for j in range(valves):
+            i = controllers.output[j]
+            if i >= 0:
+                late, share = k - controllers.lag[j], controllers.smoothing[j]
+                low, high = controllers.low[j], controllers.high[j]
+                for run in range(number):
+                    value[run] = wanted[late, i, run] - y[late, i, run] - added[late, i, run]
+                command(u[j], error[j], tuning[j], value, share, low, high)
+            follows, slopes, factor = runs.laws[j, 0], runs.laws[j, 1], runs.laws[j, 2]
+            if slopes:
+                slope_step(memory[j], u[j], friction[j, 1], ends[j])
+            for run in range(number):
+                op[k, j, run] = u[j, run]
+                apart = u[j, run] - stem[k - 1, j, run]
+                still = abs(apart) <= friction[j, 0, run]
+                slip = -friction[j, 1, run] if apart > 0.0 else friction[j, 1, run]
+                if follows:
+                    goes_on = memory[j, 2, run] * (u[j, run] - memory[j, 1, run]) > 0.0
+                    if not goes_on:
+                        memory[j, 2, run] = 0.0 if still else np.sign(apart)
+                    still = still and not goes_on
+                    slip = -memory[j, 2, run] * friction[j, 1, run]
+                    memory[j, 1, run] = u[j, run]
+                slipped = u[j, run] + slip
+                if factor != 1.0 and friction[j, 0, run] > 0.0:
+                    slipped = stem[k - 1, j, run] + factor * (apart + slip)
+                stem[k, j, run] = stem[k - 1, j, run] if still else slipped
+                if slopes and friction[j, 0, run] > 0.0:
+                    stem[k, j, run] = memory[j, 0, run]
+    seen = y + added
+    for run in range(number):
+        if gone[run]:
+            op[gone[run] + 1 :, :, run] = np.inf
+            seen[gone[run] + 1 :, :, run] = np.inf
+    op, seen = op[past:].transpose(2, 0, 1), seen[past:].transpose(2, 0, 1)
+    return np.ascontiguousarray(op), np.ascontiguousarray(seen)
 
 
 @dataclasses.dataclass(frozen=True)
