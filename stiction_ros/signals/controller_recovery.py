@@ -21,16 +21,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
 from stiction_ros.signals import holds
 from stiction_ros.signals.recovered_controller import (
     ControllerStatus,
     RecoveredController,
     Stretches,
 )
-from stiction_ros.signals.velocity_form import terms
-
-BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
 LEAST_FIT = 0.2  # R² from which on a controller is believed: rounded and held signals leave no more
 NEARLY = 0.03  # R² that a shorter span may lose against the best one
@@ -119,6 +116,7 @@ class _Form:
 @dataclasses.dataclass(frozen=True)
 class _Fit:
     form: _Form
+    rows: int
     theta: FloatArray
     kept: BoolArray
     r_squared: float
@@ -133,30 +131,11 @@ def _best(data: _Data, forms: list[_Form]) -> _Fit | None:
     return max(fits, key=lambda fit: fit.worth, default=None)
 
 
-def _columns(data: _Data, form: _Form) -> tuple[FloatArray, FloatArray]:
-    """Return regressors, shape (n, q), and moves of OP, shape (n,), over h samples."""
-    h, rows, moves = form.span, [], []
-    for (first, last), filtered in zip(data.stretches, data.filtered[form.smoothing], strict=True):
-        start = first + form.lag + 1
-        if last - start <= h:
-            continue
-        error = filtered[1 : last - first - form.lag]
-        columns = [terms(error, h)]
-        if form.derivative:
-            change = error - filtered[: len(error)]
-            columns.append(change[h:] - change[:-h])
-        if data.unknown:
-            columns.append(np.full(len(error) - h, float(h)))
-        command, free = data.command[start:last], data.free[start:last]
-        kept = free[h:] & free[:-h]
-        rows.append(np.column_stack(columns)[kept])
-        moves.append((command[h:] - command[:-h])[kept])
-    return np.vstack(rows), np.concatenate(moves)
-
-
 @compiled
 def _add_products(
     products: FloatArray,
+    ends: IntArray,
+    count: int,
     filtered: FloatArray,
     command: FloatArray,
     free: BoolArray,
@@ -164,17 +143,20 @@ def _add_products(
     derivative: bool,
     unknown: bool,
 ) -> int:
-    """Add the inner products of regressors and moves of one stretch; return the number of rows.
+    """Add the inner products of regressors and moves of one stretch; return how many rows were met.
 
     Args:
-        products: of regressors and moves, the lower half of shape (q + 1, q + 1).
+        products: of regressors and moves of each block of rows, the lower halves of shape
+            (B, q + 1, q + 1).
+        ends: row behind each block, shape (B,).
+        count: rows of the stretches before.
         filtered: e of the samples before those of ``command``, and of these, shape (n + 1,).
         command: u, as many samples late as the form says, shape (n,).
         free: where OP is free, shape (n,).
         span: h.
         derivative, unknown: whether the form has a derivative, and whether SP is unknown.
     """
-    size, count, total = len(products), 0, 0.0
+    size, block, total = products.shape[1], 0, 0.0
     row = np.empty(size)
     for k in range(len(command)):
         total += filtered[k + 1]
@@ -189,21 +171,26 @@ def _add_products(
         if unknown:
             row[size - 2] = span
         row[size - 1] = command[k] - command[k - span]
+        while count >= ends[block]:
+            block += 1
         for i in range(size):
             for j in range(i + 1):
-                products[i, j] += row[i] * row[j]
+                products[block, i, j] += row[i] * row[j]
         count += 1
     return count
 
 
-def _fit(data: _Data, form: _Form) -> _Fit | None:
+def _products(data: _Data, form: _Form, ends: IntArray) -> tuple[FloatArray, int]:
+    """Return the inner products of each block, shape (B, q + 1, q + 1), and the number of rows."""
     size = 3 + form.derivative + data.unknown
-    products, rows = np.zeros((size, size)), 0
+    products, rows = np.zeros((len(ends), size, size)), 0
     for (first, last), filtered in zip(data.stretches, data.filtered[form.smoothing], strict=True):
         start = first + form.lag + 1
         if last - start > form.span:
-            rows += _add_products(
+            rows = _add_products(
                 products,
+                ends,
+                rows,
                 filtered[: last - first - form.lag],
                 data.command[start:last],
                 data.free[start:last],
@@ -211,7 +198,11 @@ def _fit(data: _Data, form: _Form) -> _Fit | None:
                 form.derivative,
                 data.unknown,
             )
-    products += np.tril(products, -1).T
+    return products + np.tril(products, -1).swapaxes(1, 2), rows
+
+
+def _fit(data: _Data, form: _Form) -> _Fit | None:
+    (products,), rows = _products(data, form, np.array([len(data.command)]))
     gram, side, total = products[:-1, :-1], products[:-1, -1], float(products[-1, -1])
     if rows < LEAST_ROWS or total <= 0.0:
         return None
@@ -222,16 +213,14 @@ def _fit(data: _Data, form: _Form) -> _Fit | None:
         kept[-1] = kept[-1] and not data.unknown
         theta = _solved(gram, side, kept)
     r_squared = float(2.0 * theta @ side - theta @ gram @ theta) / total
-    return _Fit(form, theta, kept, r_squared)
+    return _Fit(form, rows, theta, kept, r_squared)
 
 
 def _covariance(data: _Data, fit: _Fit) -> FloatArray:
     """Return the covariance of a fit by leaving out one block after the other."""
-    columns, moves = _columns(data, fit.form)
-    edges = np.linspace(0, len(moves), BLOCKS + 1).astype(int)
-    parts = [slice(a, b) for a, b in itertools.pairwise(edges)]
-    grams = np.array([columns[part].T @ columns[part] for part in parts])
-    sides = np.array([columns[part].T @ moves[part] for part in parts])
+    ends = np.linspace(0, fit.rows, BLOCKS + 1).astype(int)[1:]
+    products, _ = _products(data, fit.form, ends)
+    grams, sides = products[:, :-1, :-1], products[:, :-1, -1]
     gram, side = grams.sum(axis=0), sides.sum(axis=0)
     without = [_solved(gram - g, side - s, fit.kept) for g, s in zip(grams, sides, strict=True)]
     about = np.array(without) - np.mean(without, axis=0)
