@@ -200,7 +200,9 @@ class MpcController:
             self._formulation.learn(self.valves, self.stem)
             sticky = [j for j, _ in self.valves.sticky]
             self._formulation.waits = self._passage.waits(self.stem[sticky], sp)
-            self._target.limits = self._formulation.reach(self.stem, self.design.limits.stem)
+            limits, idle = self.design.limits.stem.copy(), list(self._formulation.immobile)
+            limits[idle] = self.stem[idle, None]
+            self._target.limits = limits
             target = self._select(sp, preview)
             trouble = "" if target is not None else "no steady state within the limits"
         situation = Situation(

@@ -71,22 +71,19 @@ def formulation_of(
     known, others = valves.frictions, design.others
     if mode is ControlMode.HOLD:
         return None
-    aware = mode in (ControlMode.EMBEDDING, ControlMode.INVERSION)
-    if aware and others is not None:
+    if mode not in (ControlMode.EMBEDDING, ControlMode.INVERSION):
+        return unaware
+    if others is not None:
         return others(mode, unaware, known)
+    made: EmbeddingMpc | InversionMpc = InversionMpc(unaware, known)
     if mode is ControlMode.EMBEDDING:
         weights, spreads = design.embedding, valves.spreads
-        embedding = EmbeddingMpc(design.model, weights, design.limits, known, design.jumps, spreads)
-        _check_rates(design, embedding.least_kicks)
-        return embedding
-    if mode is ControlMode.INVERSION:
-        inversion = InversionMpc(unaware, known)
-        _check_rates(design, inversion.least_kicks)
-        return inversion
-    return unaware
+        made = EmbeddingMpc(design.model, weights, design.limits, known, design.jumps, spreads)
+    _check_rates(design, made.least_kicks)
+    return made
 
 
-def _check_rates(design: ControlDesign, kicks: FloatArray) -> None:
+def _check_rates(design: ControlDesign, kicks: Sequence[float]) -> None:
     """Raise InputError where OP may not move by the ``kicks`` (m,), %, that its valve needs."""
     for j, (kick, limit) in enumerate(zip(kicks, design.limits.move, strict=True)):
         if kick > limit * (1.0 + ROUNDING):

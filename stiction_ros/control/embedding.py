@@ -139,13 +139,6 @@ class EmbeddingMpc(Formulation):
     def learn(self, valves: ValveBeliefs, stem: FloatArray) -> None:
         self.know(valves.forms, valves.spreads, valves.intervals(stem))
 
-    def reach(self, stem: FloatArray, limits: FloatArray) -> FloatArray:
-        """Return ``limits`` with the valves that cannot move held where they are."""
-        found = limits.copy()
-        for j in self.immobile:
-            found[j] = stem[j]
-        return found
-
     def know(
         self,
         forms: Sequence[JumpForm | None],
@@ -179,13 +172,10 @@ class EmbeddingMpc(Formulation):
         self.immobile = tuple(j for j in self._sticky if self._least[j] > travel[j])
 
     @property
-    def least_kicks(self) -> FloatArray:
+    def least_kicks(self) -> list[float]:
         """Move of OP that the smallest jump of each valve takes from rest, (m,), %; else 0."""
-        found = np.zeros(len(self.forms))
-        for j, form in enumerate(self.forms):
-            if form is not None:
-                found[j] = form.op(0.0, float(self._least[j]))
-        return found
+        both = zip(self.forms, self._least.tolist(), strict=True)
+        return [0.0 if form is None else form.op(0.0, least) for form, least in both]
 
     def valves(self, last: FloatArray) -> StickyState:
         """Return what a problem must know of the valves, stems estimated at ``last`` (m,)."""

@@ -11,22 +11,19 @@ from stiction_ros.effects.behaviour import FloatArray
 class Formulation(abc.ABC):
     """One way to turn an estimate and a target into a plan.
 
-    In every sample :meth:`learn` comes first, then :meth:`reach` bounds the target, then
-    :meth:`plan` is asked. One that has nothing to learn or to prepare has a plan only.
+    In every sample :meth:`learn` comes first, then :meth:`plan` is asked. One that has nothing to
+    learn or to prepare has a plan only.
     """
 
     mode: ControlMode  # what it does about the friction
-    immobile: tuple[int, ...] = ()  # valves that it cannot move, by their numbers
+    # valves that it cannot move, by their numbers: their targets are where they are
+    immobile: tuple[int, ...] = ()
     # whether stems at rest are to stay in this sample where that is feasible; who plans no jumps
     # takes no notice of it
     waits: bool = False
 
     def learn(self, valves: ValveBeliefs, stem: FloatArray) -> None:  # noqa: B027
         """Take over what is believed of the m valves, and their stems, (m,), %, for later."""
-
-    def reach(self, stem: FloatArray, limits: FloatArray) -> FloatArray:
-        """Return where stems, (m,), %, within ``limits`` may come to rest, (m, 2), %."""
-        return limits
 
     @abc.abstractmethod
     def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:

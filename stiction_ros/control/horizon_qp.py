@@ -20,7 +20,6 @@ class HorizonSolution:
     plan: FloatArray  # stems in deviations from the target, shape (N, m)
     cost: float  # of the plan
     slack: FloatArray  # by how much outputs break their soft bounds at most, shape (p,)
-    pv: FloatArray | None = None  # outputs at 1 … N, shape (N, p), if soft bounds asked for them
 
 
 class Programme:
@@ -90,7 +89,6 @@ class HorizonQp:
         self.size = shape.shape[1]
         self._bounded = np.flatnonzero(np.isfinite(output_bounds).any(axis=1))
         self._output_bounds = output_bounds[self._bounded]
-        self._lowest, self._highest = output_bounds[:, 0], output_bounds[:, 1]
         self._slack_weight = slack_weights(cost)[self._bounded]
         self._hard = Programme(shape.T @ cost.hessian @ shape, rows, iterations)
 
@@ -120,8 +118,8 @@ class HorizonQp:
         lower: FloatArray,
         upper: FloatArray,
         target_pv: FloatArray,
-        offset: FloatArray | None = None,
-        curved: FloatArray | None = None,
+        offset: FloatArray,
+        curved: FloatArray,
     ) -> HorizonSolution | None:
         """Return the best plan, or None when there is none.
 
@@ -130,17 +128,12 @@ class HorizonQp:
             gradient: by :meth:`HorizonCost.linear`, shape (N m,).
             lower, upper: bounds on r and then on the further rows, shape (r + c,).
             target_pv: outputs at the target, shape (p,), about which soft bounds are written.
-            offset: v₀, shape (N m,); None for 0.
-            curved: H v₀, shape (N m,), with an offset.
+            offset: v₀, shape (N m,).
+            curved: H v₀, shape (N m,).
         """
         self.limit_reached = False
-        base = 0.0
-        if offset is None or curved is None:
-            offset = np.zeros(len(gradient))
-        else:
-            base = float(offset @ (0.5 * curved + gradient))
-            gradient = gradient + curved
-        linear = self.shape.T @ gradient
+        base = float(offset @ (0.5 * curved + gradient))
+        linear = self.shape.T @ (gradient + curved)
         if (lower > upper).any():
             return None
         if self.size == 0:
@@ -153,10 +146,8 @@ class HorizonQp:
             return None
         variables, value = found
         plan = (self.shape @ variables + offset).reshape(self.cost.horizon, -1)
-        slack, pv = np.zeros(len(target_pv)), None
-        if len(self._bounded):
-            pv = self.cost.outputs(state, plan) + target_pv
-        if pv is not None and ((pv > self._highest).any() or (pv < self._lowest).any()):
+        slack = np.zeros(len(target_pv))
+        if len(self._bounded) and self.slack(state, plan, target_pv).any():
             self._fill_bounds(state, offset, lower, upper, target_pv)
             found = self._solved(self._soft, np.append(linear, np.zeros(len(self._bounded))))
             if found is None:
@@ -164,8 +155,7 @@ class HorizonQp:
             variables, value = found[0][: self.size], found[1]
             slack[self._bounded] = found[0][self.size :]
             plan = (self.shape @ variables + offset).reshape(self.cost.horizon, -1)
-            pv = None
-        return HorizonSolution(plan, value + base, slack, pv)
+        return HorizonSolution(plan, value + base, slack)
 
     def _solved(self, programme: Programme, linear: FloatArray) -> tuple[FloatArray, float] | None:
         found = programme.solve(linear)

@@ -92,10 +92,7 @@ def predicted_outputs(
     deviation = state - target.state
     pv = np.empty((cost.horizon + 1, len(target.pv)))
     pv[0] = cost.model.c @ deviation + target.pv
-    if found.pv is None:
-        pv[1:] = cost.outputs(deviation, found.plan) + target.pv
-    else:
-        pv[1:] = found.pv
+    pv[1:] = cost.outputs(deviation, found.plan) + target.pv
     return pv
 
 
@@ -116,10 +113,9 @@ class InversionMpc(Formulation):
         )
 
     @property
-    def least_kicks(self) -> FloatArray:
+    def least_kicks(self) -> list[float]:
         """Move of OP that the smallest jump of each valve takes from rest, (m,), %; else 0."""
-        kicks = [0.0 if form is None else form.op(0.0, form.least) for form in self.forms]
-        return np.array(kicks)
+        return [0.0 if form is None else form.op(0.0, form.least) for form in self.forms]
 
     def learn(self, valves: ValveBeliefs, stem: FloatArray) -> None:
         self.forms = valves.forms

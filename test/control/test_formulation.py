@@ -37,9 +37,6 @@ class Halted(Steady):
     def learn(self, valves: ValveBeliefs, stem: FloatArray) -> None:
         self.learned.append(valves.intervals(stem))
 
-    def reach(self, stem: FloatArray, limits: FloatArray) -> FloatArray:
-        return np.column_stack([stem, stem])
-
     def optimality_gap(
         self, state: FloatArray, target: Target, last: FloatArray, plan: Plan, samples: int
     ) -> float | None:

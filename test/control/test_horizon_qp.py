@@ -23,7 +23,8 @@ def test_bounds_left_out_at_first_change_no_optimum(seed: int, room: float) -> N
     size = HORIZON * 2
     qp = HorizonQp(cost, np.eye(size), np.zeros((0, size)), bounds)
     lower, upper = np.full(size, -30.0), np.full(size, 30.0)
-    found = qp.solve(state, cost.linear(state, last), lower, upper, target.pv)
+    none, gradient = np.zeros(size), cost.linear(state, last)
+    found = qp.solve(state, gradient, lower, upper, target.pv, none, none)
     assert found is not None
     whole, linear = qp.problem(state, last, lower, upper, target.pv)
     sense = np.zeros(len(whole.upper), dtype=np.int32)
@@ -47,7 +48,7 @@ def test_a_broken_bound_is_priced_and_a_kept_one_is_not() -> None:
         bounds = np.array([[-np.inf, target.pv[0] + high], [-np.inf, np.inf]])
         qp = HorizonQp(cost, np.eye(size), np.zeros((0, size)), bounds)
         gradient = cost.linear(np.ones(3), np.zeros(2))
-        found = qp.solve(np.ones(3), gradient, -far, far, target.pv)
+        found = qp.solve(np.ones(3), gradient, -far, far, target.pv, 0.0 * far, 0.0 * far)
         assert found is not None
         return found.cost, found.slack[0]
 
