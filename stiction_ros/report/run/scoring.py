@@ -142,56 +142,41 @@ def phases(
     """Score the last whole round before the swap and the first whole one after it.
 
     Rounds are counted from the first sample. Without a repeating schedule everything before
-    the swap is set against everything after it, which the caller should say.
+    the swap is set against everything after it, which the caller should say. Without a swap the
+    last whole round is scored alone, or all of a record that has none.
     """
     sigma = [0.0] * len(record.outputs) if noise_std is None else list(noise_std)
-    if swap is None or not 0 < swap < len(record):
-        return _unswapped(record, round_samples, sigma)
-    if round_samples is None:
-        spans: tuple[int, int, int, int] = (0, swap, swap, len(record))
-    else:
-        ended = swap // round_samples
-        begun = -(-swap // round_samples)
-        spans = (
-            (ended - 1) * round_samples,
-            ended * round_samples,
-            begun * round_samples,
-            (begun + 1) * round_samples,
-        )
-        if ended < 1:
-            reason = f"the swap at sample {swap} came before the first round of set-points ended"
-            return Phases(PhaseStatus.NO_ROUND, reason, None, None, None)
-    if _gap(record, *spans[:2]):
+    swapped = swap is not None and 0 < swap < len(record)
+    end = swap if swap is not None and swapped else len(record)
+    first, last, again, behind = 0, end, end, len(record)
+    if round_samples is not None and (swapped or end >= round_samples):
+        first, last = (end // round_samples - 1) * round_samples, end - end % round_samples
+        again = -(-end // round_samples) * round_samples
+        behind = again + round_samples
+    status = PhaseStatus.NO_ROUND if swapped else PhaseStatus.NO_SWAP
+    never = "the controller was never swapped"
+    if first < 0:
+        reason = f"the swap at sample {swap} came before the first round of set-points ended"
+        return Phases(status, reason, None, None, None)
+    if _gap(record, first, last):
         reason = "the record has a gap in the last round of set-points before the swap"
-        return Phases(PhaseStatus.NO_ROUND, reason, None, None, None)
-    cycle = oscillation.dominant_cycle(*errors(record.part(spans[0], spans[1])))
+        if not swapped:
+            reason = f"{never}, and most of its last round of set-points is missing in the record"
+        return Phases(status, reason, None, None, None)
+    cycle = oscillation.dominant_cycle(*errors(record.part(first, last)))
     period = None if cycle is None else cycle.period
-    before = score(record, spans[0], spans[1], period, sigma)
-    if spans[3] > len(record):
+    before = score(record, first, last, period, sigma)
+    reason = "" if swapped else never
+    if swapped and behind > len(record):
         reason = "the record ends before one whole round of set-points after the swap"
-        return Phases(PhaseStatus.NO_ROUND, reason, cycle, before, None)
-    if _gap(record, *spans[2:]):
+    elif swapped and _gap(record, again, behind):
         reason = "the record has a gap in the first round of set-points after the swap"
-        return Phases(PhaseStatus.NO_ROUND, reason, cycle, before, None)
-    after = score(record, spans[2], spans[3], period, sigma)
+    if reason:
+        return Phases(status, reason, cycle, before, None)
+    after = score(record, again, behind, period, sigma)
     reason = _no_cycle(cycle)
     status = PhaseStatus.NO_CYCLE if reason else PhaseStatus.OK
     return Phases(status, reason, cycle, before, after)
-
-
-def _unswapped(record: Record, round_samples: int | None, sigma: Sequence[float]) -> Phases:
-    """Score the last whole round of a run without a swap, or all of it."""
-    first, last = 0, len(record)
-    if round_samples is not None and last >= round_samples:
-        last -= last % round_samples
-        first = last - round_samples
-    reason = "the controller was never swapped"
-    if _gap(record, first, last):
-        reason += ", and most of its last round of set-points is missing in the record"
-        return Phases(PhaseStatus.NO_SWAP, reason, None, None, None)
-    cycle = oscillation.dominant_cycle(*errors(record.part(first, last)))
-    before = score(record, first, last, None if cycle is None else cycle.period, sigma)
-    return Phases(PhaseStatus.NO_SWAP, reason, cycle, before, None)
 
 
 def _gap(record: Record, first: int, last: int) -> bool:
