@@ -103,16 +103,6 @@ def _kalman_gain(a: FloatArray, c: FloatArray, w: FloatArray, v: FloatArray) -> 
         return np.zeros((len(a), len(c)))
 
 
-def _free_decay(transition: FloatArray, c: FloatArray, samples: int) -> FloatArray:
-    """Return C transition^k, shape (N, p, n)."""
-    out = np.empty((samples, *c.shape))
-    row = c
-    for k in range(samples):
-        out[k] = row
-        row = row @ transition
-    return out
-
-
 def refine(model: Realisation, u: FloatArray, y: FloatArray, one_step: bool) -> Realisation:
     """Return ``model`` with B, ξ_0 and y_0 that minimise the sum of squares of one error.
 
@@ -124,16 +114,15 @@ def refine(model: Realisation, u: FloatArray, y: FloatArray, one_step: bool) -> 
     if spectral_radius(transition) >= 1.0:
         return model
     (n, m), (p, samples) = model.b.shape, y.shape
-    drives = np.zeros((samples, n, m * n + p + 1))
+    # Columns of B, of y_0, of ξ_0, and what is known.
+    drives, start = np.zeros((samples, n, m * n + p + n + 1)), np.zeros((n, m * n + p + n + 1))
     for j in range(m):
         drives[:, :, j * n : (j + 1) * n] = u[j][:, None, None] * np.eye(n)
-    drives[:, :, m * n : m * n + p] = -k
+    drives[:, :, m * n : m * n + p], start[:, m * n + p : -1] = -k, np.eye(n)
     drives[:, :, -1] = (k @ y).T
-    forced = responses(transition, model.c, drives)
+    forced = responses(transition, model.c, drives, start)
     forced[:, :, m * n : m * n + p] += np.eye(p)
-    target = y.T - forced[:, :, -1]
-    decay = _free_decay(transition, model.c, samples)
-    columns = np.concatenate([forced[:, :, :-1], decay], axis=2).reshape(samples * p, -1)
+    target, columns = y.T - forced[:, :, -1], forced[:, :, :-1].reshape(samples * p, -1)
     solution = np.linalg.lstsq(columns, target.ravel(), rcond=1e-10)[0]
     return dataclasses.replace(
         model,
@@ -147,10 +136,12 @@ def with_initial_state(model: Realisation, u: FloatArray, y: FloatArray) -> Real
     """Return ``model`` with the ξ_0 that fits its free run best; unchanged when unstable."""
     if model.radius >= 1.0:
         return model
-    forced = responses(model.a, model.c, (model.b @ u).T[:, :, None])[:, :, 0]
-    target = y.T - model.y0 - forced
-    decay = _free_decay(model.a, model.c, y.shape[1])
-    x0 = np.linalg.lstsq(decay.reshape(-1, len(model.a)), target.ravel(), rcond=1e-10)[0]
+    n, samples = len(model.a), y.shape[1]
+    drives = np.zeros((samples, n, n + 1))
+    drives[:, :, -1] = (model.b @ u).T
+    run = responses(model.a, model.c, drives, np.eye(n, n + 1))
+    target, columns = y.T - model.y0 - run[:, :, -1], run[:, :, :-1].reshape(-1, n)
+    x0 = np.linalg.lstsq(columns, target.ravel(), rcond=1e-10)[0]
     return dataclasses.replace(model, x0=np.asarray(x0, dtype=float))
 
 
