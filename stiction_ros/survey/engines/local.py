@@ -1,7 +1,7 @@
 """Worker processes of this machine: the engine that needs nothing else.
 
 Workers are forked from one process that has imported what they need, the first of them alone. One
-that is killed is replaced and its loop tried once more. A worker gets its loop when it is ready,
+that is killed is replaced and its loop tried once more. A worker takes its loop when it is ready,
 and ends itself when the loop takes too long.
 """
 
@@ -33,13 +33,12 @@ class _Worker:
     pipe: Connection
     task: Task | None = None
     attempt: int = 1
-    ready: bool = False
 
-    def send(self) -> None:
-        """Hand over the loop."""
-        assert self.task is not None
+    def give(self, task: Task, attempt: int) -> None:
+        """Hand over a loop."""
+        self.task, self.attempt = task, attempt
         with contextlib.suppress(OSError):  # it has died; that shows when it is waited for
-            self.pipe.send(self.task.loop)
+            self.pipe.send(task.loop)
 
 
 class LocalEngine:
@@ -61,16 +60,11 @@ class LocalEngine:
     def run(self, tasks: Iterable[Task], options: SurveyOptions) -> Iterator[Done]:
         """Yield what is said of each loop as it comes; refused if no worker gets ready."""
         waiting = iter(tasks)
-        exhausted = False
         try:
             while True:
                 most = self._jobs if self._proven else 1
-                while not exhausted and len(self._busy) < most:
-                    task = next(waiting, None)
-                    if task is None:
-                        exhausted = True
-                        break
-                    self._give(self._free(options), task, 1)
+                while len(self._busy) < most and (task := next(waiting, None)) is not None:
+                    self._free(options).give(task, 1)
                 if not self._busy:
                     return
                 yield from self._gathered(options)
@@ -98,11 +92,6 @@ class LocalEngine:
         self._workers.append(worker)
         return worker
 
-    def _give(self, worker: _Worker, task: Task, attempt: int) -> None:
-        worker.task, worker.attempt = task, attempt
-        if worker.ready:
-            worker.send()
-
     def _gathered(self, options: SurveyOptions) -> Iterator[Done]:
         """Wait for a worker to be ready, to answer, or to end."""
         speaking = wait([worker.pipe for worker in self._busy])
@@ -110,8 +99,7 @@ class LocalEngine:
             answer, task = _answer(worker.pipe), worker.task
             assert task is not None
             if answer == READY:
-                worker.ready = self._proven = True
-                worker.send()
+                self._proven = True
             elif isinstance(answer, Assessed):
                 worker.task = None
                 yield Done(task, answer)
@@ -131,7 +119,7 @@ class LocalEngine:
                 fix="its message stands above",
             )
         elif worker.attempt < ATTEMPTS:
-            self._give(self._free(options), task, worker.attempt + 1)
+            self._free(options).give(task, worker.attempt + 1)
         else:
             told = f"its worker ended {ATTEMPTS} times, the last time with {said}"
             yield lost(task, told, again=True)
@@ -147,10 +135,6 @@ class LocalEngine:
     def close(self) -> None:
         """End all workers."""
         for worker in self._workers:
-            worker.pipe.close()
-        for worker in self._workers:
-            if worker.task is None:
-                worker.process.join(timeout=ENDS_WITHIN)
             _end(worker)
         self._workers.clear()
 
