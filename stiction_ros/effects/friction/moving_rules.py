@@ -83,22 +83,35 @@ class MovingRules:
         jump, reverse = point
         if first is None:
             first = self.first_slip(level, 0.5 * (jump + reverse))
-        trace = Recorder(len(self.values), level)
+        moves, bounds = [(0, level, 0.0)], ([0.0, 0.0], [np.inf, np.inf])
         if first[0] < len(self.values):
-            trace.move(first[0], self.values[first[0]], first[1])
-            self._follow(trace, first, jump, reverse)
-        return trace.result()
+            moves.append((first[0], self.values[first[0]], first[1]))
+            self._follow(moves, bounds, jump, reverse)
+        begins, bases, signs = zip(*moves, strict=True)
+        lengths = np.diff([*begins, len(self.values)])
+        (low, low_reverse), (high, high_reverse) = bounds
+        bounded = low, high, low_reverse, high_reverse
+        return MovingTrace(np.repeat(bases, lengths), np.repeat(signs, lengths), bounded)
 
-    def _follow(self, trace: "Recorder", first: FirstSlip, jump: float, reverse: float) -> None:
-        """Follow OP behind the first slip with the given J and S, %."""
-        (begin, sign), moving, rested = first, True, False
-        base, values, slopes = self.values[begin], self.values, self.slopes
-        low, high = trace.low, trace.high
+    def _follow(
+        self,
+        moves: list[tuple[int, float, float]],
+        bounds: tuple[list[float], list[float]],
+        jump: float,
+        reverse: float,
+    ) -> None:
+        """Follow OP behind the first slip, the last of ``moves``, with the given J and S, %.
+
+        Each further move is noted with its sample, OP and direction, and what it says of the lower
+        and upper bounds of J and S.
+        """
+        (begin, base, sign), moving, rested = moves[-1], True, False
+        values, slopes, (low, high) = self.values, self.slopes, bounds
         for k in range(begin + 1, len(values)):
             value, slope = values[k], slopes[k]
             if moving and slope == sign:
                 base = value
-                trace.move(k, value, sign)
+                moves.append((k, value, sign))
                 continue
             lead = sign * (value - base)
             onwards, turned = lead > 0.0, sign if lead > 0.0 else -sign
@@ -114,7 +127,7 @@ class MovingRules:
             if far > (reverse if way else jump):
                 high[way] = min(high[way], far)
                 moving, sign, base = True, turned, value
-                trace.move(k, value, sign)
+                moves.append((k, value, sign))
             elif far > low[way]:
                 low[way] = far
 
@@ -123,27 +136,3 @@ class SlopeRules(MovingRules):
     """Those of Choudhury's law."""
 
     waits = True
-
-
-class Recorder:
-    """Collects the moves of one valve and the bounds of its J and S."""
-
-    def __init__(self, samples: int, level: float) -> None:
-        self.samples = samples
-        self.bases, self.signs, self.begins = [level], [0.0], [0]
-        self.low, self.high = [0.0, 0.0], [np.inf, np.inf]
-
-    def move(self, k: int, value: float, sign: float) -> None:
-        """Note that the valve moves at sample k."""
-        self.begins.append(k)
-        self.bases.append(value)
-        self.signs.append(sign)
-
-    def result(self) -> MovingTrace:
-        """Return what was collected."""
-        lengths = np.diff([*self.begins, self.samples])
-        return MovingTrace(
-            np.repeat(self.bases, lengths),
-            np.repeat(self.signs, lengths),
-            (self.low[0], self.high[0], self.low[1], self.high[1]),
-        )
