@@ -143,9 +143,16 @@ def test_ideal_valves_stay_ideal_whatever_changes(tmp_path: Path) -> None:
 def test_a_serviced_valve_is_noticed_and_the_window_begins_anew(siso: Scenario) -> None:
     scenario = quick(siso)
     changes = (ValveChange(540.0, "V1", ()),)
-    # A controller that moves often: what is looked at is the window, after few samples.
-    often = {"horizon": 30, "look_ahead": 0, "kick_limits": (math.inf,), "move_worth": (0.0,)}
-    controller = dataclasses.replace(scenario.controller, **often)
+    # A controller that moves often, as its jumps have no price: what is looked at is the window,
+    # after few samples.
+    controller = dataclasses.replace(
+        scenario.controller,
+        horizon=30,
+        look_ahead=0,
+        kick_limits=(math.inf,),
+        move_worth=(0.0,),
+        embedding_move_weights=(0.01,),
+    )
     scenario = dataclasses.replace(scenario, controller=controller, valve_changes=changes)
     live = run_live(scenario, samples=1105, seed=1)
     noticed = next(fit for fit in live.fits if fit.changes and fit.loop_model is not None)
