@@ -5,7 +5,6 @@ from collections import deque
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any
 
-from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
@@ -56,7 +55,6 @@ class ControllerNode(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("controller", ControllerNodeSettings, **kwargs)
-        self._late_timer: Timer | None = None
         self.listening = False  # whether a PV is for this node: it is active
 
     def configure(self) -> None:
@@ -114,28 +112,13 @@ class ControllerNode(ManagedNode):
 
     def deactivate(self) -> None:
         self.listening = False
-        self._look_for_late(None)
+        self.never("late")
 
-    def _look_for_late(self, period: float | None) -> None:
-        """Look several times in a ``period`` (s) what is due; None: no more."""
-        if self._late_timer is not None:
-            self.destroy_timer(self._late_timer)
-            self._late_timer = None
-        if period is not None:
-            every = min(max(period / 2, QUICKEST), SLOWEST)
-            self._late_timer = self.create_timer(every, self._go_on_without)
+    def _look_for_late(self, period: float) -> None:
+        """Look several times in a ``period`` (s) what is due."""
+        self.every(min(max(period / 2, QUICKEST), SLOWEST), "late", self._go_on_without)
 
-    def finish(self) -> None:
-        super().finish()
-        self._close()
-
-    def _tear_down(self) -> None:
-        self.deactivate()
-        super()._tear_down()
-        self._close()
-
-    def _close(self) -> None:
-        """End what is done beside the loop; a node that was never configured has nothing."""
+    def close(self) -> None:
         if hasattr(self, "live"):
             self.live.close()
 

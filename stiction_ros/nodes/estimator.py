@@ -6,7 +6,6 @@ from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
-from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -97,19 +96,15 @@ class EstimatorNode(ManagedNode):
             self.notice("op", "error", "no op")
 
     def finish(self) -> None:
-        self._end_worker()
+        self.close()  # so that the last fits are told
         super().finish()
 
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self._end_worker()
-        self.destroy_guard_condition(self._done)
-        return super().on_cleanup(state)
-
-    def _end_worker(self) -> None:
+    def close(self) -> None:
         if self._worker is not None:
             self._worker.close()
             self._worker = None
             self._collect()
+            self.destroy_guard_condition(self._done)
 
     # ---- samples in, fits out ----------------------------------------------------------------
 

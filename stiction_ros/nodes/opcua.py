@@ -5,7 +5,6 @@ import random
 import time
 from typing import Any
 
-from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -34,9 +33,7 @@ class OpcuaNode(ManagedNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("opcua", OpcuaNodeSettings, **kwargs)
         self._link: PlantLink | None = None
-        self._pacer: Timer | None = None
         self._woken = False
-        self._graph_services: list[Any] = []
 
     def configure(self) -> None:
         settings = self.settings
@@ -98,12 +95,8 @@ class OpcuaNode(ManagedNode):
         if writes:
             take = functools.partial(self._on_op, name)
             self.inlet(JointState, f"{prefix}op", take, READER_QOS, ("controller",))
-            ask = functools.partial(self._on_ask, name)
-            back = functools.partial(self._on_give_back, name)
-            self._graph_services += [
-                self.create_service(Trigger, f"{prefix}ask_grant", ask),
-                self.create_service(Trigger, f"{prefix}give_back_grant", back),
-            ]
+            self.offer(f"{prefix}ask_grant", functools.partial(self._on_ask, name))
+            self.offer(f"{prefix}give_back_grant", functools.partial(self._on_give_back, name))
 
     def configuration(self) -> dict[str, Any]:
         return {"url": self._url, "bridged": [tags.loop for tags in self._loops]}
@@ -121,13 +114,10 @@ class OpcuaNode(ManagedNode):
         self._link = PlantLink(settings, self._wake)
         self._link.start()
         shortest = min(bridge.period for bridge in self.bridges.values())
-        every = min(max(shortest / PART, QUICKEST), SLOWEST)
-        self._pacer = self.create_timer(every, self._serve)
+        self.every(min(max(shortest / PART, QUICKEST), SLOWEST), "serve", self._serve)
 
     def deactivate(self) -> None:
-        if self._pacer is not None:
-            self.destroy_timer(self._pacer)
-            self._pacer = None
+        self.never("serve")
         link, self._link = self._link, None
         if link is not None:
             now = time.monotonic()
@@ -135,13 +125,6 @@ class OpcuaNode(ManagedNode):
                 link.submit(bridge.give_back(now, "the node stops"))
             link.stop()
             self._tell_grants()
-
-    def _tear_down(self) -> None:
-        self.deactivate()
-        for service in self._graph_services:
-            self.destroy_service(service)
-        self._graph_services = []
-        super()._tear_down()
 
     # ---- diagnostics -----------------------------------------------------------------------
 

@@ -6,7 +6,6 @@ import time
 from collections import Counter
 from typing import Any
 
-from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
@@ -54,7 +53,6 @@ class PlantNode(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("plant", PlantNodeSettings, **kwargs)
-        self._pacer: Timer | None = None
 
     def configure(self) -> None:
         settings = self.settings
@@ -122,13 +120,10 @@ class PlantNode(ManagedNode):
             self._set_pace(self.settings.speed)
 
     def deactivate(self) -> None:
-        if self._pacer is not None:
-            self.destroy_timer(self._pacer)
-            self._pacer = None
+        self.never("pace")
 
     def retune(self, settings: PlantNodeSettings) -> None:
-        if self._pacer is not None and settings.speed != self.settings.speed:
-            self.deactivate()
+        if "pace" in self.regular and settings.speed != self.settings.speed:
             self._set_pace(settings.speed)
 
     def partner_lost(self, name: str, what: str) -> None:
@@ -215,7 +210,7 @@ class PlantNode(ManagedNode):
     def _set_pace(self, speed: float) -> None:
         period = self.model.sample_time / speed
         self._grid = TickGrid(period, time.monotonic())
-        self._pacer = self.create_timer(period, self._tick)
+        self.every(period, "pace", self._tick)
 
     def _tick(self) -> None:
         """Go on by one sample; ticks keep to a grid of wall time that a late one begins anew."""
@@ -223,8 +218,7 @@ class PlantNode(ManagedNode):
             return
         before = self._grid.missed
         if self._grid.tick(time.monotonic()):
-            if self._pacer is not None:
-                self._pacer.reset()
+            self.regular["pace"].reset()
             if self._grid.missed > before:
                 self._missed += self._grid.missed - before
                 self.notice("pace", "warn", "the plant is slower than its speed asks for")

@@ -4,9 +4,7 @@ import time
 from typing import Any
 
 from rclpy.duration import Duration
-from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
@@ -32,8 +30,6 @@ class PlayerNode(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("player", PlayerNodeSettings, **kwargs)
-        self._pacer: Timer | None = None
-        self._offered: list[Any] = []
 
     def configure(self) -> None:
         settings = self.settings
@@ -53,15 +49,10 @@ class PlayerNode(ManagedNode):
         self._resumes = not settings.paused
         for note in content.notes:
             self.log.warning(note)
-        self._offered = [
-            self.create_service(Trigger, f"~/{name}", call)
-            for name, call in (
-                ("pause", self._on_pause),
-                ("resume", self._on_resume),
-                ("step", self._on_step),
-            )
-        ]
-        self._pacer = self.create_timer(PERIOD, self._tick)
+        self.offer("~/pause", self._on_pause)
+        self.offer("~/resume", self._on_resume)
+        self.offer("~/step", self._on_step)
+        self.every(PERIOD, "play", self._tick)
 
     def linked(self) -> None:
         if self._resumes:
@@ -85,15 +76,6 @@ class PlayerNode(ManagedNode):
         keys += [(f"skipped:{name}", why) for name, why in self._skipped.items()]
         level = "warn" if self._skipped else "ok"
         return level, "finished" if playback.finished else text, keys
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        if self._pacer is not None:
-            self.destroy_timer(self._pacer)
-            self._pacer = None
-        for service in self._offered:
-            self.destroy_service(service)
-        self._offered = []
-        return super().on_cleanup(state)
 
     # ---- topics ----------------------------------------------------------------------------
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -87,10 +86,8 @@ class RecorderNode(ManagedNode):
         own = settings.regex == OWN and space != "/"
         self._own_pv = self.resolve_topic_name("pv") if own else ""
         self._clock_runs = False
-        self._looking = [
-            self.create_timer(DISCOVERY_PERIOD, self._discover),
-            self.create_timer(BAG_PERIOD, self._look_at_the_bag),
-        ]
+        self.every(DISCOVERY_PERIOD, "discover", self._discover)
+        self.every(BAG_PERIOD, "bag", self._look_at_the_bag)
         self._discover()  # now, or its own first status would find no reader
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
@@ -103,10 +100,6 @@ class RecorderNode(ManagedNode):
         keys += [("lost", self._lost), ("put_back", self._put_back)]
         return ("warn" if self._skipped or self._unheard else "ok"), "recording", keys
 
-    def finish(self) -> None:
-        super().finish()
-        self.close()
-
     def close(self) -> None:
         """Write what has arrived and finish the bag.
 
@@ -116,8 +109,7 @@ class RecorderNode(ManagedNode):
             return
         self._take_the_rest()
         writer, self.writer = self.writer, None
-        for timer in self._looking:
-            self.destroy_timer(timer)
+        self.never("discover")
         try:
             writer.close()
         except (OSError, InputError) as error:
@@ -126,10 +118,6 @@ class RecorderNode(ManagedNode):
             self.log.error(self.failure)
         else:
             self.log.info(f"bag finished: {writer.directory}")
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.close()
-        return super().on_cleanup(state)
 
     # ---- topics ----------------------------------------------------------------------------
 

@@ -17,6 +17,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.timer import Timer
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from stiction_ros import __version__
 from stiction_ros.errors import InputError
@@ -62,7 +63,8 @@ class ManagedNode(LifecycleNode):
         self.noticed = Noticed(time.monotonic)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._ready = self._linked = self._configured = False
-        self._link_timer: Timer | None = None
+        self.regular: dict[str, Timer] = {}
+        self._offered: list[Any] = []
         parameters.declare(self, settings)
         self.settings: Any = settings()  # of the class that the subclass declares
         self.add_on_set_parameters_callback(self._on_set)
@@ -84,6 +86,16 @@ class ManagedNode(LifecycleNode):
         """Create a timer on a steady clock: simulated time that stands still stops no node."""
         clock = clock or self._steady
         return super().create_timer(timer_period_sec, callback, callback_group, clock, autostart)
+
+    def every(self, period: float, name: str, work: Callable[[], None]) -> None:
+        """Do ``work`` every ``period`` s, in place of what had this name, until :meth:`never`."""
+        self.never(name)
+        self.regular[name] = self.create_timer(period, work)
+
+    def never(self, name: str) -> None:
+        """End what is done regularly under a name, if anything is."""
+        if name in self.regular:
+            self.destroy_timer(self.regular.pop(name))
 
     # ---- lifecycle -------------------------------------------------------------------------
 
@@ -126,6 +138,9 @@ class ManagedNode(LifecycleNode):
     def deactivate(self) -> None:
         """Stop for a while."""
 
+    def close(self) -> None:
+        """End what runs beside the node, if anything does."""
+
     def finish(self) -> None:
         """Publish the last diagnostics and wait until all readers have everything."""
         if not self.outlets:
@@ -137,13 +152,14 @@ class ManagedNode(LifecycleNode):
         for outlet in self.outlets.values():
             left = max(end - time.monotonic(), 0.0)
             outlet.publisher.wait_for_all_acked(Duration(seconds=left))
+        self.close()
 
     def _configure(self) -> None:
         parameters.refuse_unknown(self)
         self.settings = parameters.read(self, self.settings_class)
         self._diagnostics = self.outlet(DiagnosticArray, "/diagnostics", QoSProfile(depth=100))
         self._looks, self._told_level = 0, "ok"
-        self._beat = self.create_timer(LOOK_PERIOD, self._look_around)
+        self.every(LOOK_PERIOD, "look", self._look_around)
         self.configure()
         self._configured = True
 
@@ -152,25 +168,26 @@ class ManagedNode(LifecycleNode):
         self._peers, self._busy = Peers(self, self.settings.wait_for), ""
         self._remind_at = time.monotonic() + LINK_PATIENCE
         self.activate()
-        self._link_timer = self.create_timer(LINK_PERIOD, self._look_for_peers)
+        self.every(LINK_PERIOD, "link", self._look_for_peers)
 
     def _stop(self) -> None:
         self.running = False
-        if self._link_timer is not None:
-            self.destroy_timer(self._link_timer)
-            self._link_timer = None
+        self.never("link")
 
     def _tear_down(self) -> None:
         self._stop()
-        self._linked = False
-        self._configured = False
-        self.destroy_timer(self._beat)
+        self.close()
+        self._linked = self._configured = False
+        for name in list(self.regular):
+            self.never(name)
+        for service in self._offered:
+            self.destroy_service(service)
         for subscription in list(self.subscriptions):
             if subscription is not self._time_source._clock_sub:  # that of use_sim_time
                 self.destroy_subscription(subscription)
         for outlet in self.outlets.values():
             self.destroy_publisher(outlet.publisher)
-        self.outlets, self.inlets = {}, {}
+        self.outlets, self.inlets, self._offered = {}, {}, []
 
     def _guarded(self, action: Callable[[], None]) -> TransitionCallbackReturn:
         self.failure = ""
@@ -208,6 +225,10 @@ class ManagedNode(LifecycleNode):
         """Subscribe; ``writers`` are the nodes whose first message must not be missed."""
         subscription = self.create_subscription(kind, topic, take, qos)
         self.inlets[topic] = Inlet(subscription, writers, qos)
+
+    def offer(self, name: str, call: Callable[[Any, Any], Any]) -> None:
+        """Offer a service that takes nothing and answers whether it was done, and what to say."""
+        self._offered.append(self.create_service(Trigger, name, call))
 
     def linked(self) -> None:
         """Called once when everything in ``wait_for`` has matched, in both directions."""
