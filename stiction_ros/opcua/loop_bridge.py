@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -103,8 +103,7 @@ class LoopBridge:
         self._tried: tuple[float, float] | None = None  # a request that is under way, and when
         self._bad = 0  # samples of bad quality in succession
         self._stamp: int | None = None
-        self._writing: FloatArray | None = None  # an OP that is under way, and until when
-        self._writing_until = now
+        self._writing: WriteOrder | None = None  # an OP that is under way
         self._last: tuple[FloatArray, float] | None = None  # OP written in this grant, and when
         self._read_at: dict[str, float] = {}
 
@@ -186,20 +185,13 @@ class LoopBridge:
         """Follow the grant, and return the request and the beat that are to be written."""
         if self.grant.state is GrantState.LISTENING:
             return []
-        before = self.grant.state
-        self.grant = self.grant.follow(now, self._is_granted(), self._fault(now))
+        told, before = self.tags.grant, self.grant.state
+        assert told is not None
+        modes = (self.sampler.latest(valve.mode) for valve in self.tags.valves)
+        self.grant = self.grant.follow(now, all_grant(modes, told.granted), self._fault(now))
         if self.grant.state is not before:
             self._last = None
         return [*self._request(now), *self._beats(now)]
-
-    def _is_granted(self) -> bool:
-        """Return whether the mode of every valve grants it."""
-        assert self.tags.grant is not None
-        found = [self.sampler.latest(valve.mode) for valve in self.tags.valves]
-        return all(
-            one.quality is TagQuality.GOOD and mode_text(one.value) in self.tags.grant.granted
-            for one in found
-        )
 
     def _foreign_beats(self, now: float) -> bool:
         assert self.tags.grant is not None
@@ -235,7 +227,7 @@ class LoopBridge:
             return "OP in force beyond its limits"
         if now - self._command_at > stopped_after(self.period):
             return f"no op from {self.op_port.commander or 'anyone'}"
-        if self._writing is not None and now > self._writing_until:
+        if self._writing is not None and now > self._writing.expires:
             return "the server does not take an OP in time"
         if not self.grant.requesting and self._told:
             return "the last request is being taken back"
@@ -320,11 +312,12 @@ class LoopBridge:
             self.rate_watch.begin(limits, wanted, in_force)
         elif self.rate_watch.note(limits, wanted, in_force, op):
             self.counts["op_cut_by_rate"] += 1
-        self._writing = op
         values = tuple((v.op, float(x)) for v, x in zip(self.tags.valves, op, strict=True))
         modes = tuple(valve.mode for valve in self.tags.valves)
-        self._writing_until = expires = now + max(self.period, IN_TIME)
-        return [WriteOrder(self.tags.loop, Use.OP, values, expires, modes, told.granted)]
+        expires = now + max(self.period, IN_TIME)
+        order = WriteOrder(self.tags.loop, Use.OP, values, expires, modes, told.granted)
+        self._writing = order
+        return [order]
 
     def written(
         self, order: WriteOrder, failure: str, seconds: float, now: float
@@ -337,13 +330,18 @@ class LoopBridge:
             self._told = order.values[0][1]
         if order.kind is Use.OP:
             if not failure and self._writing is not None:
-                self._last = self._writing, now
+                self._last = np.array([value for _, value in self._writing.values]), now
             self._writing = None
         if failure and self.grant.requesting:
             return self.give_back(now, f"{order.kind.value} not written: {failure}")
         if seconds > told.watchdog / SLOW and self.grant.requesting:
             return self.give_back(now, f"the server took {seconds:.1f} s to answer")
         return []
+
+
+def all_grant(modes: Iterable[TagReading], granted: Sequence[str]) -> bool:
+    """Return whether each of the ``modes`` is of good quality and one that grants writing."""
+    return all(one.quality is TagQuality.GOOD and mode_text(one.value) in granted for one in modes)
 
 
 def mode_text(value: float | str | None) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from stiction_ros.errors import InputError
 from stiction_ros.opcua import security
-from stiction_ros.opcua.loop_bridge import MODE_REFUSES, WriteOrder, mode_text
+from stiction_ros.opcua.loop_bridge import MODE_REFUSES, WriteOrder, all_grant
 from stiction_ros.opcua.sampling import TagQuality, TagReading, quality_of
 
 if TYPE_CHECKING:
@@ -194,11 +194,7 @@ async def write(
     try:
         if order.modes:
             modes = await client.read_attributes([client.get_node(resolve[m]) for m in order.modes])
-            found = [reading_of(one, first=True) for one in modes]
-            if any(
-                one.quality is not TagQuality.GOOD or mode_text(one.value) not in order.granted
-                for one in found
-            ):
+            if not all_grant((reading_of(one, first=True) for one in modes), order.granted):
                 return MODE_REFUSES
         if time.monotonic() > order.expires:
             return "it came too late to be written"

@@ -11,8 +11,6 @@ from typing import Any
 from stiction_ros.errors import InputError
 from stiction_ros.loop.yaml_reading import Section, load_yaml
 
-_NODE = re.compile(r"(ns=\d+;|nsu=[^;]+;)?[isgb]=.+")
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ADDRESS = re.compile(r"opc\.tcp://(?:\[[\da-fA-F:.]+\]|[^\s/:\[\]]+)(?::([^\s/]*))?(?:/\S*)?")
 HIGHEST_PORT = 65_535
 WATCHDOG = 5.0  # s without a beat after which the other side is given up
@@ -42,23 +40,20 @@ def _read(kind: type[Any], section: Section) -> Any:
     return kind(**found)
 
 
-def _name(section: Section, key: str) -> str:
-    name = section.text(key)
-    if not _NAME.fullmatch(name):
-        raise InputError(
-            f"{name!r} is no name", where=section.at(key), fix="use letters, digits and _"
-        )
-    return name
+def _text(pattern: str, what: str, fix: str) -> Callable[[Section, str], str]:
+    """Return what reads a text of one form; of another it is no such ``what``, and to be mended."""
+
+    def read(section: Section, key: str) -> str:
+        text = section.text(key)
+        if not re.fullmatch(pattern, text):
+            raise InputError(f"{text!r} is no {what}", where=section.at(key), fix=fix)
+        return text
+
+    return read
 
 
-def _node(section: Section, key: str) -> str:
-    """Return a node id such as ``ns=2;s=FIC101.PV`` or ``nsu=urn:plant;s=FIC101.PV``."""
-    node = section.text(key)
-    if not _NODE.fullmatch(node):
-        raise InputError(
-            f"{node!r} is no node id", where=section.at(key), fix="write ns=2;s=FIC101.PV"
-        )
-    return node
+_name = _text(r"[A-Za-z][A-Za-z0-9_]*", "name", "use letters, digits and _")
+_node = _text(r"(ns=\d+;|nsu=[^;]+;)?[isgb]=.+", "node id", "write ns=2;s=FIC101.PV")
 
 
 def _rising(section: Section, key: str) -> tuple[float, ...]:
@@ -200,9 +195,7 @@ def _loop(section: Section) -> LoopTags:
     name = _name(section, "loop")
     namespace = name
     if "namespace" in section:
-        namespace = section.values["namespace"]
-        if namespace and not _NAME.fullmatch(str(namespace)):
-            raise InputError(f"{namespace!r} is no name", where=section.at("namespace"))
+        namespace = section.values["namespace"] and _name(section, "namespace")
     sample_time = section.number("sample_time", above=0.0)
     outputs = tuple(_read(OutputTags, one) for one in section.sections("outputs"))
     valves = tuple(_read(ValveTags, one) for one in section.sections("valves"))
