@@ -53,7 +53,8 @@ def _print(bag: str, found: "Replay") -> None:
     head = ("window ends", "valves", "replayed and recorded")
     table = Table(*head, title=f"{bag}: {found.samples} samples", title_justify="left")
     for fit in found.fits:
-        said = str(fit.match).replace("_", " ") + (f": {fit.difference}" if fit.difference else "")
+        difference = fit.comparison.difference
+        said = str(fit.comparison.match).replace("_", " ") + (f": {difference}" * bool(difference))
         table.add_row(f"{found.seconds(fit.fit.stamp):.9g} s", _valves(fit), said)
     console.print(table)
     if found.op is not None:
@@ -61,16 +62,16 @@ def _print(bag: str, found: "Replay") -> None:
     if found.modes is not None:
         times = [
             "never" if change is None else f"at {found.seconds(change.stamp):.9g} s"
-            for change in found.modes.swaps
+            for change in found.swaps
         ]
         console.print(f"swap: recorded {times[0]}, replayed {times[1]}")
         word = str(found.modes.match).replace("_", " ")
-        console.print(f"changes of mode: {len(found.modes.recorded)} recorded, {word}")
+        console.print(f"changes of mode: {len(found.bag.modes)} recorded, {word}")
     if found.monitor is not None:
-        monitor = found.monitor
+        looks, findings = found.monitor
         console.print(
-            f"monitor: {monitor.equal_looks} of {monitor.looks} measurements and "
-            f"{monitor.equal_findings} of {monitor.findings} findings are equal"
+            f"monitor: {looks.equal} of {looks.compared} measurements and "
+            f"{findings.equal} of {findings.compared} findings are equal"
         )
     for note in found.notes:
         console.print(f"note: {note}")

@@ -107,7 +107,7 @@ def replay_answer(name: str) -> Answer:
 
     found = replay(_bag(name))
     updates = [fit.fit.update for fit in found.fits]
-    swaps = [] if found.modes is None else found.modes.swaps
+    swaps = [] if found.modes is None else found.swaps
     return {
         "samples": found.samples,
         "swaps": [None if swap is None else found.seconds(swap.stamp) for swap in swaps],

@@ -129,8 +129,8 @@ def test_the_replay_gives_the_run_again_bit_for_bit(bag):
     assert found.from_first_sample
     assert found.op is not None
     assert found.op.equal == SAMPLES
-    assert {fit.match for fit in found.fits} == {Match.EQUAL}
-    recorded, replayed = found.modes.swaps
+    assert {fit.comparison.match for fit in found.fits} == {Match.EQUAL}
+    recorded, replayed = found.swaps
     assert recorded is not None
     assert recorded == replayed
     assert found.notes == ()

@@ -71,7 +71,7 @@ def replay_controller(
                 ModeChange(stamp, change.mode.value, change.model, change.reason, frictions)
             )
     own = {stamp: tuple(op.tolist()) for stamp, op in recorded.items() if stamp in replayed}
-    op = Comparison.of(lambda at: f"op at {(at - origin) / SECOND:.9g} s", own, replayed)
+    op = Comparison.each(lambda at: f"op at {(at - origin) / SECOND:.9g} s", own, replayed)
     return ReplayedControl(without_repeats(changes), op, tuple(notes))
 
 

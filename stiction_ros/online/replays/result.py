@@ -2,7 +2,7 @@
 
 import dataclasses
 import enum
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from stiction_ros.online.loop_estimator import SECOND, Fit
@@ -18,22 +18,23 @@ class Match(enum.StrEnum):
     DIFFERENT = "different"
     NOT_COMPARED = "not_compared"
 
-    @classmethod
-    def of(cls, difference: str) -> "Match":
-        """Return how two things compare of which this is the first difference."""
-        return cls.DIFFERENT if difference else cls.EQUAL
-
 
 @dataclasses.dataclass(frozen=True)
 class Comparison:
-    """How many recorded things were compared, how many came again, and the first that did not."""
+    """How many recorded things were compared, and how many came again, equal in every bit."""
 
     compared: int = 0
     equal: int = 0
-    first_difference: str = ""
+    difference: str = ""  # the first difference, or why nothing is compared; empty when equal
 
     @classmethod
-    def of(
+    def whole(cls, recorded: Any, replayed: Any) -> "Comparison":
+        """Compare one thing."""
+        difference = first_difference(recorded, replayed)
+        return cls(1, int(not difference), difference)
+
+    @classmethod
+    def each(
         cls, called: Callable[[int], str], recorded: Mapping[int, Any], replayed: Mapping[int, Any]
     ) -> "Comparison":
         """Compare all that was recorded, by stamp in ns; ``called`` names the one of a stamp."""
@@ -46,42 +47,21 @@ class Comparison:
                 found.append(f"{called(stamp)}: {difference}")
         return cls(len(recorded), len(recorded) - len(found), found[0] if found else "")
 
+    @property
+    def match(self) -> Match:
+        """How the two compare."""
+        if not self.compared:
+            return Match.NOT_COMPARED
+        return Match.EQUAL if self.equal == self.compared else Match.DIFFERENT
+
 
 @dataclasses.dataclass(frozen=True)
 class FitMatch:
-    """One fit, replayed and recorded."""
+    """One fit of the replay, whether the bag holds its whole window, and how it compares."""
 
-    fit: Fit  # of the replay
-    whole: bool  # whether the bag holds the whole window
-    match: Match  # equal in every bit, different, or not compared
-    difference: str  # the first difference, or why it is not compared; empty when equal
-
-
-@dataclasses.dataclass(frozen=True)
-class ModeMatch:
-    """The changes of mode, recorded and replayed."""
-
-    recorded: tuple[ModeChange, ...]  # recorded, replayed: in their order
-    replayed: tuple[ModeChange, ...]
-    match: Match  # equal when stamps, modes, models, reasons and frictions are
-    difference: str  # the first difference, or why nothing is compared; empty when equal
-
-    @property
-    def swaps(self) -> tuple[ModeChange | None, ModeChange | None]:
-        """The swap that was recorded and the replayed one."""
-        return swap_of(self.recorded), swap_of(self.replayed)
-
-
-@dataclasses.dataclass(frozen=True)
-class MonitorMatch:
-    """What the monitor told, replayed and recorded."""
-
-    looks: int  # looks, equal_looks: measurements of the gap in the bag, and how many came again
-    equal_looks: int
-    findings: int  # findings, equal_findings: windows looked into, likewise
-    equal_findings: int
-    match: Match  # equal in every bit, different, or not compared
-    difference: str  # the first difference, or why nothing is compared; empty when equal
+    fit: Fit
+    whole: bool
+    comparison: Comparison
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,34 +73,39 @@ class Replay:
     from_first_sample: bool  # whether the bag holds the run from its first sample
     samples: int  # of the run up to the end of the bag
     fits: tuple[FitMatch, ...]  # every fit that was due within the bag
-    # modes, op: None without a configuration of a controller, and for a bag that begins late
-    modes: ModeMatch | None
+    changes: tuple[ModeChange, ...]  # changes of mode in the replay
+    # modes, op: None without a configuration of a controller, and for a bag that begins late;
+    # modes are equal when stamps, modes, models, reasons and frictions are
+    modes: Comparison | None
     op: Comparison | None
+    # measurements of the gap and windows looked into; None when the estimator ran without monitor
+    monitor: tuple[Comparison, Comparison] | None
     notes: tuple[str, ...]  # what stands in the way of equality, one sentence each
-    monitor: MonitorMatch | None = None  # None when the estimator ran without monitor
 
     @property
     def _compared(self) -> Iterator[tuple[Match, str]]:
         """What came of each comparison, with its difference: fits, ``op``, modes, monitor."""
         for fit in self.fits:
-            yield fit.match, f"fit at {self.seconds(fit.fit.stamp):.9g} s: {fit.difference}"
-        if self.op is not None and self.op.compared:
-            yield Match.of(self.op.first_difference), self.op.first_difference
-        for one in (self.modes, self.monitor):
+            said = f"fit at {self.seconds(fit.fit.stamp):.9g} s: {fit.comparison.difference}"
+            yield fit.comparison.match, said
+        for one in (self.op, self.modes, *(self.monitor or ())):
             if one is not None:
                 yield one.match, one.difference
 
     @property
     def match(self) -> Match:
         """``different`` when anything compared differs, ``equal`` when anything is compared."""
-        found = [match for match, _ in self._compared]
-        order = (Match.DIFFERENT, Match.EQUAL)
-        return next((match for match in order if match in found), Match.NOT_COMPARED)
+        return _altogether(match for match, _ in self._compared)
 
     @property
     def first_difference(self) -> str:
         """The first difference: of fits, ``op``, modes, then the monitor; empty for none."""
         return next((said for match, said in self._compared if match is Match.DIFFERENT), "")
+
+    @property
+    def swaps(self) -> tuple[ModeChange | None, ModeChange | None]:
+        """The swap that was recorded and the replayed one."""
+        return swap_of(self.bag.modes), swap_of(self.changes)
 
     def seconds(self, stamp: int) -> float:
         """Return the time of a stamp in s since the first sample of the run."""
@@ -135,10 +120,10 @@ class Replay:
             "from_first_sample": self.from_first_sample,
             "samples": self.samples,
             "fits": [self._fit(match) for match in self.fits],
-            "op": None if self.op is None else dataclasses.asdict(self.op),
+            "op": None if self.op is None else self._op(self.op),
             "modes": None if self.modes is None else self._modes(self.modes),
-            "swap": None if self.modes is None else self._swap(self.modes),
-            "monitor": None if self.monitor is None else dataclasses.asdict(self.monitor),
+            "swap": None if self.modes is None else self._swap(),
+            "monitor": None if self.monitor is None else self._monitor(*self.monitor),
             "notes": list(self.notes),
         }
         return dict(finite(document))
@@ -149,27 +134,37 @@ class Replay:
         return {
             "sample": match.fit.end,
             "time": self.seconds(match.fit.stamp),
-            "match": match.match.value,
-            "difference": match.difference,
+            "match": match.comparison.match.value,
+            "difference": match.comparison.difference,
             "whole_window": match.whole,
             "failure": match.fit.failure,
             "loop_model": bool(match.fit.model_text),
             "valves": [valve.to_dict() for valve in valves],
         }
 
-    def _modes(self, modes: ModeMatch) -> dict[str, Any]:
+    def _op(self, op: Comparison) -> dict[str, Any]:
+        return {"compared": op.compared, "equal": op.equal, "first_difference": op.difference}
+
+    def _modes(self, modes: Comparison) -> dict[str, Any]:
         return {
             "match": modes.match.value,
             "difference": modes.difference,
-            "recorded": [self._change(change) for change in modes.recorded],
-            "replayed": [self._change(change) for change in modes.replayed],
+            "recorded": [self._change(change) for change in self.bag.modes],
+            "replayed": [self._change(change) for change in self.changes],
         }
 
-    def _swap(self, modes: ModeMatch) -> dict[str, float | None]:
-        recorded, replayed = modes.swaps
+    def _swap(self) -> dict[str, float | None]:
+        times = [None if swap is None else self.seconds(swap.stamp) for swap in self.swaps]
+        return dict(zip(("recorded", "replayed"), times, strict=True))
+
+    def _monitor(self, looks: Comparison, findings: Comparison) -> dict[str, Any]:
         return {
-            "recorded": None if recorded is None else self.seconds(recorded.stamp),
-            "replayed": None if replayed is None else self.seconds(replayed.stamp),
+            "looks": looks.compared,
+            "equal_looks": looks.equal,
+            "findings": findings.compared,
+            "equal_findings": findings.equal,
+            "match": _altogether((looks.match, findings.match)).value,
+            "difference": looks.difference or findings.difference,
         }
 
     def _change(self, change: ModeChange) -> dict[str, Any]:
@@ -180,6 +175,13 @@ class Replay:
             "reason": change.reason,
             "friction": dict(change.frictions),
         }
+
+
+def _altogether(found: Iterable[Match]) -> Match:
+    """Return ``different`` when anything compared differs, ``equal`` when anything is compared."""
+    matches = set(found)
+    order = (Match.DIFFERENT, Match.EQUAL)
+    return next((match for match in order if match in matches), Match.NOT_COMPARED)
 
 
 def first_difference(recorded: Any, found: Any, place: str = "") -> str:

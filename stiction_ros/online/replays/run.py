@@ -12,15 +12,7 @@ from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorN
 from stiction_ros.online.replays.bag import NodeConfig, ReplayBag, fit_told, read_replay_bag
 from stiction_ros.online.replays.controller import ReplayedControl, replay_controller
 from stiction_ros.online.replays.estimator import Progress, ReplayedEstimates, replay_estimator
-from stiction_ros.online.replays.result import (
-    Comparison,
-    FitMatch,
-    Match,
-    ModeMatch,
-    MonitorMatch,
-    Replay,
-    first_difference,
-)
+from stiction_ros.online.replays.result import Comparison, FitMatch, Replay
 from stiction_ros.records.bag.run_metadata import mapping_of
 from stiction_ros.records.run.events import ModeChange
 from stiction_ros.settings import from_mapping
@@ -80,10 +72,11 @@ def replay(
         from_first_sample=whole,
         samples=estimator.samples,
         fits=fits,
-        modes=None if control is None else _match_modes(bag.modes, control.changes),
+        changes=() if control is None else control.changes,
+        modes=None if control is None else _compared_modes(bag.modes, control.changes),
         op=None if control is None else control.op,
+        monitor=_compared_monitor(bag, estimator) if settings.monitor else None,
         notes=tuple(notes),
-        monitor=_match_monitor(bag, estimator) if settings.monitor else None,
     )
 
 
@@ -124,9 +117,9 @@ def _match_fit(bag: ReplayBag, estimator: ReplayedEstimates, fit: Fit, window: i
     is 0 for a bag of the whole run, in which also what is trusted after the fit is compared.
     """
     if window and max(fit.end + 1 - window, 0) < estimator.first:
-        return FitMatch(fit, False, Match.NOT_COMPARED, "window begins before the bag")
+        return FitMatch(fit, False, Comparison(difference="window begins before the bag"))
     if fit.stamp not in bag.fits:
-        return FitMatch(fit, True, Match.NOT_COMPARED, "not in the bag")
+        return FitMatch(fit, True, Comparison(difference="not in the bag"))
     model = bag.models.get(fit.token) if fit.model_text else None
     recorded = bag.fits[fit.stamp] | bag.told["identification"].get(fit.stamp, {})
     replayed = fit_told(fit.rows, fit.token) | estimator.told["identification"].get(fit.stamp, {})
@@ -135,46 +128,42 @@ def _match_fit(bag: ReplayBag, estimator: ReplayedEstimates, fit: Fit, window: i
     if window:
         known = ("names", "stiction", "identification")
         recorded = {key: told for key, told in recorded.items() if key in known}
-    difference = first_difference(recorded, replayed)
-    return FitMatch(fit, True, Match.of(difference), difference)
+    return FitMatch(fit, True, Comparison.whole(recorded, replayed))
 
 
-def _match_modes(recorded: Sequence[ModeChange], replayed: Sequence[ModeChange]) -> ModeMatch:
+def _compared_modes(recorded: Sequence[ModeChange], replayed: Sequence[ModeChange]) -> Comparison:
     """Compare the changes of mode, with the time, model, reason and friction of each."""
-    both = tuple(recorded), tuple(replayed)
     if not recorded:
-        return ModeMatch(*both, Match.NOT_COMPARED, "the bag holds no change of mode")
+        return Comparison(difference="the bag holds no change of mode")
     was, found = (
         {f"change {number}": vars(change) for number, change in enumerate(changes, start=1)}
         | {"changes of mode": len(changes)}
-        for changes in both
+        for changes in (recorded, replayed)
     )
-    difference = first_difference(was, found)
-    return ModeMatch(*both, Match.of(difference), difference)
+    return Comparison.whole(was, found)
 
 
-def _match_monitor(bag: ReplayBag, estimator: ReplayedEstimates) -> MonitorMatch:
+def _compared_monitor(
+    bag: ReplayBag, estimator: ReplayedEstimates
+) -> tuple[Comparison, Comparison]:
     """Compare measurements and findings by the end of their window.
 
     Of the bag everything must come again; what the node was still looking into is not in it.
     """
     if estimator.first:
-        why = "the bag begins after the baseline"
-        return MonitorMatch(0, 0, 0, 0, Match.NOT_COMPARED, why)
+        late = Comparison(difference="the bag begins after the baseline")
+        return late, late
 
     def compared(kind: str, key: str) -> Comparison:
         def called(end: int) -> str:
             return f"{kind} of the window that ends at {(end - estimator.origin) / SECOND:.9g} s"
 
-        return Comparison.of(called, bag.told[key], estimator.told[key])
+        return Comparison.each(called, bag.told[key], estimator.told[key])
 
-    looks, findings = compared("gap", "look"), compared("finding", "finding")
-    difference = looks.first_difference or findings.first_difference
-    match = Match.of(difference)
-    if not looks.compared and not difference:
-        match, difference = Match.NOT_COMPARED, "the bag holds no measurement"
-    counts = looks.compared, looks.equal, findings.compared, findings.equal
-    return MonitorMatch(*counts, match, difference)
+    looks = compared("gap", "look")
+    if not looks.compared:
+        looks = Comparison(difference="the bag holds no measurement")
+    return looks, compared("finding", "finding")
 
 
 def _remarks(bag: ReplayBag) -> list[str]:

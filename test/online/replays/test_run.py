@@ -74,7 +74,7 @@ def whole(bag: Path) -> Replay:
 
 
 def test_every_fit_is_equal(whole: Replay) -> None:
-    found = [(fit.fit.end, fit.match, fit.difference) for fit in whole.fits]
+    found = [(fit.fit.end, fit.comparison.match, fit.comparison.difference) for fit in whole.fits]
     assert found == [(end, Match.EQUAL, "") for end in FITS]
 
 
@@ -86,7 +86,7 @@ def test_every_op_is_equal(whole: Replay) -> None:
 def test_the_swap_comes_at_the_same_moment(whole: Replay, swap: int) -> None:
     assert whole.modes is not None
     assert (whole.modes.match, whole.modes.difference) == (Match.EQUAL, "")
-    recorded, replayed = whole.modes.swaps
+    recorded, replayed = whole.swaps
     assert recorded is not None
     assert recorded == replayed
     assert whole.seconds(recorded.stamp) == swap
@@ -106,8 +106,8 @@ def test_a_run_with_another_law_is_replayed_bit_for_bit(tmp_path: Path) -> None:
     assert (found.match, found.first_difference) == (Match.EQUAL, "")
     assert list(found.fits[-1].fit.rows) == ["V1.f_s", "V1.f_d", "V1.kano.s", "V1.kano.j"]
     assert found.modes is not None
-    assert found.modes.swaps[0] is not None
-    assert set(found.modes.swaps[0].frictions) == {"V1.f_s", "V1.f_d", "V1.s", "V1.j"}
+    assert found.swaps[0] is not None
+    assert set(found.swaps[0].frictions) == {"V1.f_s", "V1.f_d", "V1.s", "V1.j"}
 
 
 def test_the_json_tells_fits_modes_and_swap(
@@ -133,7 +133,7 @@ def test_a_bag_that_begins_late_is_compared_from_its_first_whole_window(
     found = replay(cut_bag(bag, tmp_path / "bag", first=121.0))
     assert not found.from_first_sample
     assert found.op is None
-    assert [(fit.whole, fit.match) for fit in found.fits] == [
+    assert [(fit.whole, fit.comparison.match) for fit in found.fits] == [
         (False, Match.NOT_COMPARED),
         (True, Match.EQUAL),
         (True, Match.EQUAL),
@@ -206,9 +206,9 @@ def test_another_pv_makes_another_fit(bag: Path, tmp_path: Path) -> None:
 
 def test_another_friction_in_stiction_is_named(bag: Path, tmp_path: Path) -> None:
     found = replay(copy_bag(bag, tmp_path / "bag", joint(bag, "/stiction", 450, 0.25)))
-    spoilt = found.fits[1]
+    spoilt = found.fits[1].comparison
     assert spoilt.match is Match.DIFFERENT
-    estimate = spoilt.fit.rows["V1.f_s"][0]
+    estimate = found.fits[1].fit.rows["V1.f_s"][0]
     assert spoilt.difference == (
         f"stiction.V1.f_s.value: recorded {estimate + 0.25!r}, replayed {estimate!r}"
     )
@@ -237,7 +237,7 @@ def test_a_lost_sample_is_noted(bag: Path, tmp_path: Path) -> None:
 
 def test_a_bag_without_the_estimates_compares_op_and_modes_alone(bag: Path, tmp_path: Path) -> None:
     found = replay(copy_bag(bag, tmp_path / "bag", without("/stiction")))
-    assert {fit.match for fit in found.fits} == {Match.NOT_COMPARED}
+    assert {fit.comparison.match for fit in found.fits} == {Match.NOT_COMPARED}
     assert found.match is Match.EQUAL
 
 
