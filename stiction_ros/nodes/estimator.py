@@ -19,7 +19,7 @@ from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.online.health import Notice, stopped_after
 from stiction_ros.online.loop_estimator import Fit, Keys, LoopEstimator, Told
 from stiction_ros.online.monitor.gap_finding import GapFinding
-from stiction_ros.online.monitor.monitoring import Monitoring
+from stiction_ros.online.monitor.gap_monitor import GapMonitor
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 
 COUNTED = ("bridged", "repeated", "stale", "future")
@@ -67,10 +67,10 @@ class EstimatorNode(ManagedNode):
         self.estimator.retune(settings)
 
     def tasks(self) -> list[tuple[str, str, str, list[tuple[str, object]]]]:
-        monitoring = self.estimator.monitoring
-        if monitoring is None or not self.settings.monitor:
+        monitor = self.estimator.monitor
+        if monitor is None or not self.settings.monitor:
             return []
-        return [monitor_status(monitoring, self.estimator.pairs.stamp_of)]
+        return [monitor_status(monitor, self.estimator.pairs.stamp_of)]
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
         estimator, now = self.estimator, time.monotonic()
@@ -158,20 +158,20 @@ def figures_of(update: FitUpdate) -> str:
 
 
 def monitor_status(
-    monitoring: Monitoring, stamp_of: Callable[[int], int]
+    monitor: GapMonitor, stamp_of: Callable[[int], int]
 ) -> tuple[str, str, str, Keys]:
     """Return level, task, message and key-values of the monitor's own status.
 
     Args:
-        monitoring: of the node.
+        monitor: of the node.
         stamp_of: gives the stamp of a sample, ns.
     """
-    look, finding = monitoring.look, monitoring.finding
+    look, finding = monitor.look, monitor.finding
     keys: Keys = [
-        ("looks", monitoring.looks),
-        ("grown_looks", monitoring.grown),
-        ("runs", monitoring.runs),
-        ("running", monitoring.running),
+        ("looks", monitor.looks),
+        ("grown_looks", monitor.grown),
+        ("runs", monitor.runs),
+        ("running", monitor.running),
     ]
     if look is not None:
         keys.append(("window_end", stamp_of(look.end)))
@@ -185,4 +185,4 @@ def monitor_status(
             ("verdict_window_end", stamp_of(finding.end)),
         ]
     troubled = look is not None and (look.grown or bool(look.failure))
-    return "warn" if troubled else "ok", "monitor", monitoring.text, keys
+    return "warn" if troubled else "ok", "monitor", monitor.text, keys

@@ -16,8 +16,7 @@ from stiction_ros.online.handover.hand_over import AtOnce
 from stiction_ros.online.health import Notice
 from stiction_ros.online.input.samples import picked
 from stiction_ros.online.monitor.gap_finding import GapFinding
-from stiction_ros.online.monitor.gap_monitor import GapLook
-from stiction_ros.online.monitor.monitoring import Monitoring
+from stiction_ros.online.monitor.gap_monitor import GapLook, GapMonitor
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.online.pairing import NEW_RUN, PairedSample
 from stiction_ros.records import Record
@@ -68,7 +67,7 @@ class LoopEstimator:
 
     Attributes:
         pairs: what pairs PV and OP.
-        live, monitoring: estimator and monitor; None before the first sample.
+        live, monitor: estimator and monitor; None before the first sample.
         tags: of ``pv`` and ``op``, as the first message of each told them.
         refused: messages that lacked a tag, by ``pv`` and ``op``.
         first, samples: number of the first sample, None before it; one more than that of the last.
@@ -100,7 +99,7 @@ class LoopEstimator:
     def _begin(self) -> None:
         self.pairs = self.settings.pairing()
         self.live: LiveEstimator | None = None
-        self.monitoring: Monitoring | None = None
+        self.monitor: GapMonitor | None = None
         self.tags: dict[str, tuple[str, ...]] = {"pv": (), "op": ()}
         self.first: int | None = None
         self._pending: deque[tuple[int, Record, Future[Identification]]] = deque()
@@ -111,9 +110,9 @@ class LoopEstimator:
         settings.options()
         self.settings = settings
         self.pairs.retune(*settings.bridges())
-        if self.live is not None and self.monitoring is not None:
+        if self.live is not None and self.monitor is not None:
             self.live.retune(settings)
-            self.monitoring.retune(settings)
+            self.monitor.retune(settings)
 
     # ---- messages in -----------------------------------------------------------------------
 
@@ -149,15 +148,15 @@ class LoopEstimator:
     def add(self, found: PairedSample) -> list[Told]:
         """Take in one sample."""
         settings = self.settings
-        if self.live is None or self.monitoring is None:
-            names = (settings.loop, self.tags["op"], self.tags["pv"])
-            self.live = LiveEstimator(settings, *names, settings.sample_time)
-            self.monitoring = Monitoring(settings, self.live, self._watched, self._submit)
+        if self.live is None or self.monitor is None:
+            loop = (settings.loop, self.tags["op"], self.tags["pv"], settings.sample_time)
+            self.live = LiveEstimator(settings, *loop)
+            self.monitor = GapMonitor(settings, *loop, self._watched, self._submit)
             self.first = found.sample
         told: list[Told] = []
         if found.missed or found.begins:
             self.live.restart()
-            self.monitoring.restart()
+            self.monitor.restart()
             told += self._skipped(found)
         elif not np.isfinite(found.pv).all():
             text = f"bad samples from {found.sample} on, window anew"
@@ -168,7 +167,7 @@ class LoopEstimator:
             future = self._submit(fit, record, self.live.options())
             self._pending.append((found.sample, record, future))
             told += self.collect()
-        look = self.monitoring.add(found.sample, found.op, found.pv)
+        look = self.monitor.add(found.sample, found.op, found.pv)
         return [*told, *([] if look is None else [look]), *self.collect()]
 
     def _skipped(self, found: PairedSample) -> list[Told]:
@@ -187,13 +186,13 @@ class LoopEstimator:
     def collect(self) -> list[Told]:
         """Return every fit that is done, in order, and what the monitor has found."""
         told: list[Told] = []
-        if self.live is None or self.monitoring is None:
+        if self.live is None or self.monitor is None:
             return told
         while self._pending and self._pending[0][2].done():
             end, record, future = self._pending.popleft()
             if not future.cancelled():
-                told.append(self._concluded(end, record, future, self.live, self.monitoring))
-        return told + list(self.monitoring.collect())
+                told.append(self._concluded(end, record, future, self.live, self.monitor))
+        return told + list(self.monitor.collect())
 
     def _concluded(
         self,
@@ -201,12 +200,12 @@ class LoopEstimator:
         record: Record,
         found: Future[Identification],
         live: LiveEstimator,
-        monitoring: Monitoring,
+        monitor: GapMonitor,
     ) -> Fit:
         stamp, text = self.pairs.stamp_of(end), ""
         try:
             update = live.conclude(end, found.result(), record)
-            monitoring.learn(update)
+            monitor.learn(live, update)
         except Exception as error:  # one fit that fails must not end the estimator
             return Fit(end, stamp, self.token, error=error)
         if update.loop_model is not None:

@@ -14,12 +14,11 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "online"))
-from monitored_loops import ONSET, RULE, loop, record, shifted
+from monitored_loops import ONSET, RULE, WATCHED, loop, record, shifted
 
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, joint_state
-from stiction_ros.online.estimator.live import EstimatorSettings, LiveEstimator
-from stiction_ros.online.monitor.monitoring import Monitoring
+from stiction_ros.online.monitor.gap_monitor import GapMonitor
 from stiction_ros.texts import json_text
 
 SAMPLES, LOOKS = 1120, 12
@@ -74,10 +73,9 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
 @pytest.fixture(scope="module")
 def twin() -> dict[str, list[dict[str, Any]]]:
     """What the monitor says of the same samples without ROS."""
-    live = LiveEstimator(EstimatorSettings(**NEVER), "watched", ["V1"], ["PV1"], 1.0)
-    monitoring = Monitoring(RULE, live, loop())
-    looks = [monitoring.add(k, SHIFTED.op[k], SHIFTED.pv[k]) for k in range(SAMPLES)]
-    said = {"look": [look for look in looks if look], "finding": monitoring.collect()}
+    monitor = GapMonitor(RULE, *WATCHED, loop())
+    looks = [monitor.add(k, SHIFTED.op[k], SHIFTED.pv[k]) for k in range(SAMPLES)]
+    said = {"look": [look for look in looks if look], "finding": monitor.collect()}
     return {
         key: [json.loads(json_text(one.to_dict(), indent=None)) for one in found]
         for key, found in said.items()

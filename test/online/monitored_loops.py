@@ -1,6 +1,7 @@
 """Small loops under PI control for the monitor, quick to simulate."""
 
 import dataclasses
+from concurrent.futures import Future
 
 import numpy as np
 
@@ -13,6 +14,7 @@ RULE = MonitorRule(monitor=True, monitor_window=300, monitor_period=50, monitor_
 LEAD = RULE.lead
 FIRST = LEAD + 400  # samples until the baseline is there
 ONSET = 1000
+WATCHED = ("watched", ("V1",), ("PV1",), 1.0)
 
 
 def loop(noise: float = 0.1) -> LoopModel:
@@ -59,10 +61,11 @@ def record(plant: LoopModel, samples: int = 2000, seed: int = 1) -> Record:
 
 
 def monitor(rule: MonitorRule = RULE, model: LoopModel | None = None) -> GapMonitor:
-    """Return a monitor that knows ``model``, by default the loop without anything wrong."""
-    made = GapMonitor(rule, "watched", ("V1",), ("PV1",), 1.0)
-    made.use(loop() if model is None else model, 0)
-    return made
+    """Return a monitor that knows ``model``, by default the loop without anything wrong.
+
+    Nobody looks into its windows.
+    """
+    return GapMonitor(rule, *WATCHED, model or loop(), lambda *_: Future())
 
 
 def looks(made: GapMonitor, recorded: Record, first: int = 0) -> list[GapLook]:

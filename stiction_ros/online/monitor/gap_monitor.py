@@ -1,18 +1,24 @@
-"""When the gap between loop and model has grown, and on which windows that is looked into."""
+"""Whether the gap between loop and model has grown, and what the windows are that show it."""
 
 import dataclasses
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import CancelledError, Future
 from typing import Any
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
+from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator
+from stiction_ros.online.handover.hand_over import AtOnce
 from stiction_ros.online.monitor import gap_measure
+from stiction_ros.online.monitor.gap_finding import GapFinding, find_in_window, standing
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
+
+Submit = Callable[..., "Future[Any]"]
 
 HISTORY_SAMPLES = 20_000  # from which the stems of sticky valves are known
 
@@ -87,13 +93,24 @@ class GapLook:
 
 
 class GapMonitor:
-    """Keeps the window, the baseline and whether the gap has grown.
+    """Keeps the window and the baseline, and has windows with a grown gap looked into.
+
+    The model is the given one with the trusted friction of the estimator, or, where none was
+    given, the loop as the first fit found it and then every loop model that is published. It
+    changes ``fit_latency`` samples after the end of the window it was found in, as the
+    controller does.
 
     The baseline is a stretch of signals: another model is measured on the same one. When as many
     samples have passed under another model, they become the baseline if their gap is smaller.
 
     The workflow looks into the window with which the gap has grown, and into one more every
     half window while it stays so, up to the first that lies wholly behind the alarm.
+
+    Attributes:
+        model: in force; None before there is one.
+        looks, grown, runs: measurements so far, those with a grown gap, windows looked into.
+        look: the last measurement, or None.
+        finding: what stands of the last growth, or None.
     """
 
     def __init__(
@@ -103,13 +120,25 @@ class GapMonitor:
         valves: Sequence[str],
         outputs: Sequence[str],
         sample_time: float,
+        given: LoopModel | None = None,
+        submit: Submit | None = None,
     ) -> None:
-        """Start with an empty window, without baseline and model."""
+        """Start with an empty window, without baseline.
+
+        A ``given`` model of another loop fails each measurement; ``submit`` runs a function with
+        arguments in another process, in order; without it they run here.
+        """
         self.rule = rule
         self._loop, self._sample_time = loop, sample_time
         self._valves, self._outputs = tuple(valves), tuple(outputs)
-        self._coming: list[tuple[int, LoopModel]] = []
+        self._given, self._submit = given, submit or AtOnce().submit
+        self._coming: list[tuple[int, LoopModel]] = [] if given is None else [(0, given)]
+        self._running: deque[tuple[GapLook, Future[GapFinding]]] = deque()
+        self._refusal = ""
         self.model: LoopModel | None = None
+        self.looks = self.grown = self.runs = 0
+        self.look: GapLook | None = None
+        self.finding: GapFinding | None = None
         self._begin_anew()
 
     def _begin_anew(self) -> None:
@@ -129,19 +158,53 @@ class GapMonitor:
 
     def retune(self, rule: MonitorRule) -> None:
         """Change the rule from the next sample on; turned on or with other lengths, begin anew."""
+        if rule.monitor and not self.rule.monitor:
+            self.look = self.finding = None
         old, new = ((r.monitor, r.monitor_window, r.monitor_baseline) for r in (self.rule, rule))
         self.rule = rule
         if old != new:
             self._begin_anew()
 
     @property
-    def has_model(self) -> bool:
-        """Whether a model is in force or will be."""
+    def running(self) -> int:
+        """How many windows are being looked into."""
+        return len(self._running)
+
+    @property
+    def text(self) -> str:
+        """One sentence on the present state."""
+        if self.look is None:
+            return "no measurement yet" if self._has_model else f"no loop model yet{self._refusal}"
+        if not self.look.grown:
+            return self.look.text
+        if self._running or self.finding is None:
+            return f"{self.look.text}; looking for the effect"
+        return f"{self.finding.text}; {self.look.text}"
+
+    # ---- the model -------------------------------------------------------------------------
+
+    @property
+    def _has_model(self) -> bool:
         return self.model is not None or bool(self._coming)
 
     def use(self, model: LoopModel, sample: int) -> None:
         """Compare with ``model`` from the window on that ends at ``sample`` or later."""
         self._coming.append((sample, model))
+
+    def learn(self, live: LiveEstimator, update: FitUpdate) -> None:
+        """Take in a fit of the estimator: its loop model comes into force after the latency."""
+        model = update.loop_model
+        if self._given is not None:
+            model = None if model is None else with_friction_of(self._given, model)
+        elif model is None and not self._has_model:
+            try:
+                model = live.describe(update)
+            except InputError as error:  # a fit without a usable process
+                self._refusal = f": {error}"
+        if model is not None:
+            self.use(model, update.end + live.settings.fit_latency)
+
+    # ---- samples in, measurements and findings out -----------------------------------------
 
     def restart(self) -> None:
         """Empty the window, as after samples that were missed; the baseline is kept."""
@@ -154,6 +217,35 @@ class GapMonitor:
         Nothing is kept while the rule's ``monitor`` is false.
         No window holds a sample that is not finite: it begins anew behind it.
         """
+        look = self._measured(sample, op, pv)
+        if look is not None:
+            self.looks, self.look = self.looks + 1, look
+            self.grown += look.grown
+            if look.alarm:
+                self.finding = None
+            if look.job is not None:
+                self._running.append((look, self._submit(find_in_window, *look.job)))
+        return look
+
+    def collect(self) -> list[GapFinding]:
+        """Return what has been found since the last call, in order."""
+        found = []
+        while self._running and self._running[0][1].done():
+            look, future = self._running.popleft()
+            try:
+                new: GapFinding = future.result()
+            except CancelledError:
+                continue
+            except Exception as error:  # one window that fails must not end the estimator
+                said = str(error) if isinstance(error, InputError) else repr(error)
+                said = f"window not usable: {said}"
+                new = GapFinding(look.begin, look.end, None, said, (), {})
+            self.runs += 1
+            self.finding = standing(self.finding, new)
+            found.append(new)
+        return found
+
+    def _measured(self, sample: int, op: FloatArray, pv: FloatArray) -> GapLook | None:
         self._take_model(sample)
         if not self.rule.monitor:
             return None
@@ -238,6 +330,17 @@ class GapMonitor:
                 return False
         self._looked_into = sample
         return True
+
+
+def with_friction_of(model: LoopModel, identified: LoopModel) -> LoopModel:
+    """Return ``model`` with the stiction of its valves replaced by what was identified."""
+    found = {valve.name: valve.effects for valve in identified.valves}
+    effects: dict[str, tuple[Behaviour, ...]] = {}
+    for valve in model.valves:
+        kept = [effect for effect in valve.effects if effect.effect != "stiction"]
+        sticky = [e for e in found.get(valve.name, ()) if e.effect == "stiction"]
+        effects[valve.name] = (*kept, *sticky)
+    return model.with_valve_effects(effects)
 
 
 def _size(known: Sequence[gap_measure.OutputBaseline]) -> float:

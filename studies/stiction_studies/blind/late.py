@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.effects import Behaviour, ExtraDelay, Memory, StepDisturbance
 from stiction_ros.loop import LoopModel, simulate_closed_loop
-from stiction_ros.online.monitor.gap_finding import GapFinding, find_in_window, standing
+from stiction_ros.online.monitor.gap_finding import GapFinding, standing
 from stiction_ros.online.monitor.gap_monitor import GapLook, GapMonitor, MonitorRule
 from stiction_ros.records import Record
 from stiction_studies.blind.loops.base_loops import base_loop
@@ -136,17 +136,14 @@ def _from_onset(model: LoopModel, hidden: Hidden, target: int) -> LoopModel:
 def watch(loop: LateLoop, rule: MonitorRule) -> Watched:
     """Run the monitor, and the workflow where it asks for it, over a loop."""
     record, onset = loop.record, ONSET if loop.truth.hidden else SAMPLES
-    monitor = GapMonitor(rule, record.name, record.valves, record.outputs, record.sample_time)
-    monitor.use(loop.model, 0)
+    watched = record.name, record.valves, record.outputs, record.sample_time
+    monitor = GapMonitor(rule, *watched, loop.model)
     looks: list[GapLook] = []
     findings: list[GapFinding] = []
     for k in range(len(record)):
         look = monitor.add(k, record.op[k], record.pv[k])
-        if look is None:
-            continue
-        looks.append(look)
-        if look.job is not None:
-            findings.append(find_in_window(*look.job))
+        looks += [] if look is None else [look]
+        findings += monitor.collect()
     behind = [look for look in looks if look.end >= onset]
     first = next((look.end for look in behind if look.grown), None)
     return Watched(

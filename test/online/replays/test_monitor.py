@@ -12,11 +12,10 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "records"))
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bag_cutting import SECOND, Change, copy_bag, cut_bag
 from bag_making import Bag
-from monitored_loops import RULE, loop, record, shifted
+from monitored_loops import RULE, WATCHED, loop, record, shifted
 
 from stiction_ros import __version__
-from stiction_ros.online.estimator.live import LiveEstimator
-from stiction_ros.online.monitor.monitoring import Monitoring
+from stiction_ros.online.monitor.gap_monitor import GapMonitor
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.online.replays.result import Comparison, Match
 from stiction_ros.online.replays.run import replay
@@ -42,18 +41,17 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     document["model"] = loop().to_mapping()
     made.text("/estimator/config", yaml.safe_dump(document, sort_keys=False), SECOND)
     recorded = record(shifted(), SAMPLES)
-    live = LiveEstimator(SETTINGS, "watched", ["V1"], ["PV1"], 1.0)
-    monitoring = Monitoring(SETTINGS, live, loop())
+    monitor = GapMonitor(SETTINGS, *WATCHED, loop())
     for k in range(SAMPLES):
         stamp = (k + 1) * SECOND
         made.joint("/pv", stamp, {"PV1": recorded.pv[k, 0]})
         made.joint("/op", stamp, {"V1": recorded.op[k, 0]})
         if k % 200 == 20:
             made.diagnostics(stamp, "estimator: status", {"sample": str(k + 1)})
-        look = monitoring.add(k, recorded.op[k], recorded.pv[k])
+        look = monitor.add(k, recorded.op[k], recorded.pv[k])
         if look is not None:
             _tell(made, stamp, "gap", "look", json_text(look.to_dict(), indent=None))
-        for found in monitoring.collect():
+        for found in monitor.collect():
             _tell(made, stamp, "finding", "finding", json_text(found.to_dict(), indent=None))
     made.writer.close()
     return path

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from monitored_loops import RULE, loop, record, shifted
+from monitored_loops import RULE, WATCHED, loop, record, shifted
 
 from stiction_ros.effects import Backlash, HeStiction
 from stiction_ros.errors import InputError
@@ -23,15 +23,14 @@ from stiction_ros.identification import (
 )
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.estimator.live import EstimatorSettings, FitUpdate, LiveEstimator
-from stiction_ros.online.monitor.gap_monitor import MonitorRule
-from stiction_ros.online.monitor.monitoring import Monitoring, with_friction_of
+from stiction_ros.online.monitor.gap_monitor import GapMonitor, MonitorRule, with_friction_of
 
 SETTINGS = EstimatorSettings(fit_first=20, fit_every=10, fit_latency=5, confirmations=1)
 SHIFTED = record(shifted(), 1200)
 
 
 def live() -> LiveEstimator:
-    return LiveEstimator(SETTINGS, "watched", ["V1"], ["PV1"], 1.0)
+    return LiveEstimator(SETTINGS, *WATCHED)
 
 
 def fit(verdict: VerdictKind = VerdictKind.STICKY) -> Identification:
@@ -42,18 +41,18 @@ def fit(verdict: VerdictKind = VerdictKind.STICKY) -> Identification:
     )
 
 
-def fed(monitoring: Monitoring, first: int, last: int) -> None:
+def fed(monitor: GapMonitor, first: int, last: int) -> None:
     for k in range(first, last):
-        monitoring.add(k, SHIFTED.op[k], SHIFTED.pv[k])
+        monitor.add(k, SHIFTED.op[k], SHIFTED.pv[k])
 
 
 def model_after(update: FitUpdate, samples: int, given: LoopModel | None) -> LoopModel | None:
     """Return the model in force ``samples`` samples after the window of the fit."""
-    monitoring = Monitoring(RULE, live(), given)
-    fed(monitoring, 0, update.end + 1)
-    monitoring.learn(update)
-    fed(monitoring, update.end + 1, update.end + 1 + samples)
-    return monitoring.monitor.model
+    monitor = GapMonitor(RULE, *WATCHED, given)
+    fed(monitor, 0, update.end + 1)
+    monitor.learn(live(), update)
+    fed(monitor, update.end + 1, update.end + 1 + samples)
+    return monitor.model
 
 
 def frictions(model: LoopModel | None) -> list[str]:
@@ -84,13 +83,13 @@ def test_without_a_model_the_loop_is_taken_as_the_first_fit_found_it() -> None:
 
 def test_later_fits_without_a_new_loop_model_change_nothing() -> None:
     estimator = live()
-    monitoring = Monitoring(RULE, estimator)
+    monitor = GapMonitor(RULE, *WATCHED)
     for end in (20, 30):
-        monitoring.learn(estimator.conclude(end, fit(VerdictKind.HEALTHY)))
-    fed(monitoring, 0, 26)
-    first = monitoring.monitor.model
-    fed(monitoring, 26, 60)
-    assert monitoring.monitor.model is first
+        monitor.learn(estimator, estimator.conclude(end, fit(VerdictKind.HEALTHY)))
+    fed(monitor, 0, 26)
+    first = monitor.model
+    fed(monitor, 26, 60)
+    assert monitor.model is first
 
 
 def test_other_effects_of_a_valve_stay_beside_its_friction() -> None:
@@ -103,15 +102,15 @@ def test_other_effects_of_a_valve_stay_beside_its_friction() -> None:
 
 
 def test_a_shift_is_found_and_told_in_one_sentence() -> None:
-    monitoring = Monitoring(RULE, live(), loop())
-    fed(monitoring, 0, 1050)
-    assert monitoring.text.endswith("looking for the effect")
-    (found,) = monitoring.collect()
+    monitor = GapMonitor(RULE, *WATCHED, loop())
+    fed(monitor, 0, 1050)
+    assert monitor.text.endswith("looking for the effect")
+    (found,) = monitor.collect()
     assert "PV1: " in found.text
-    assert monitoring.text.startswith(found.text)
-    assert (monitoring.looks, monitoring.grown, monitoring.runs) == (11, 1, 1)
-    fed(monitoring, 1050, 1100)
-    assert monitoring.collect() == []
+    assert monitor.text.startswith(found.text)
+    assert (monitor.looks, monitor.grown, monitor.runs) == (11, 1, 1)
+    fed(monitor, 1050, 1100)
+    assert monitor.collect() == []
 
 
 class Later:
@@ -131,43 +130,43 @@ class Later:
 )
 def test_a_run_that_fails_is_a_finding(error: Exception, said: str) -> None:
     later = Later()
-    monitoring = Monitoring(RULE, live(), loop(), later)
-    fed(monitoring, 0, 1100)
-    assert monitoring.collect() == []
+    monitor = GapMonitor(RULE, *WATCHED, loop(), later)
+    fed(monitor, 0, 1100)
+    assert monitor.collect() == []
     later.futures[0].set_exception(error)
-    (found,) = monitoring.collect()
+    (found,) = monitor.collect()
     assert found.verdict is None
     assert said in found.text
 
 
 def test_a_run_that_was_called_off_is_no_finding() -> None:
     later = Later()
-    monitoring = Monitoring(RULE, live(), loop(), later)
-    fed(monitoring, 0, 1100)
+    monitor = GapMonitor(RULE, *WATCHED, loop(), later)
+    fed(monitor, 0, 1100)
     later.futures[0].cancel()
-    assert monitoring.collect() == []
-    assert monitoring.running == 0
+    assert monitor.collect() == []
+    assert monitor.running == 0
 
 
 @pytest.mark.parametrize(
     ("given", "text"), [(None, "no loop model yet"), (loop(), "no measurement yet")]
 )
 def test_what_is_missing_is_told(given: LoopModel | None, text: str) -> None:
-    assert Monitoring(RULE, live(), given).text == text
+    assert GapMonitor(RULE, *WATCHED, given).text == text
 
 
 def test_a_fit_without_a_process_is_no_model() -> None:
-    monitoring = Monitoring(RULE, live())
+    monitor = GapMonitor(RULE, *WATCHED)
     empty = dataclasses.replace(fit(VerdictKind.HEALTHY), outputs=())
-    monitoring.learn(live().conclude(40, empty))
-    assert monitoring.text.startswith("no loop model yet: model identified for watched")
+    monitor.learn(live(), live().conclude(40, empty))
+    assert monitor.text.startswith("no loop model yet: model identified for watched")
 
 
 @pytest.mark.trial
 def test_turned_on_again_it_has_found_nothing_yet() -> None:
-    monitoring = Monitoring(RULE, live(), loop())
-    fed(monitoring, 0, 1050)
-    monitoring.collect()
-    monitoring.retune(MonitorRule())
-    monitoring.retune(RULE)
-    assert (monitoring.look, monitoring.finding) == (None, None)
+    monitor = GapMonitor(RULE, *WATCHED, loop())
+    fed(monitor, 0, 1050)
+    monitor.collect()
+    monitor.retune(MonitorRule())
+    monitor.retune(RULE)
+    assert (monitor.look, monitor.finding) == (None, None)
