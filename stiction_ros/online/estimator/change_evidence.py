@@ -250,23 +250,6 @@ class Evidence:
         count = len(self.op[rows]) * len(self.innovations)
         return 0.5 * (total[0] - total[1:]), total[1:] / count
 
-    def slope(
-        self, signature: list[FloatArray], direction: list[FloatArray], first: int
-    ) -> tuple[float, float] | None:
-        """Return how far along ``direction`` innovations lie beyond ``signature``, and the error.
-
-        By least squares from sample ``first`` on, gains open; None where it shows nowhere.
-        """
-        top = bottom = 0.0
-        for seen, change, along, gains in zip(
-            self.innovations, signature, direction, self._gains, strict=True
-        ):
-            basis = np.linalg.qr(gains[first:])[0]
-            wanted = along[first:] - basis @ (basis.T @ along[first:])
-            top += float((seen - change)[first:] @ wanted)
-            bottom += float(wanted @ wanted)
-        return (top / bottom, bottom**-0.5) if bottom > 0.0 else None
-
     @property
     def mean_square(self) -> float:
         """Mean square of the innovations; 1 where process and frictions are as they were."""

@@ -2,6 +2,8 @@
 
 import dataclasses
 import enum
+import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -28,7 +30,7 @@ FINELY = 3  # of the moves are looked at on a fine grid
 BEFORE = 10  # and moves before each that may be the first of the new friction
 DYNAMIC_ERROR = 0.008  # standard error of f_D, in f_S, that no number of moves takes away
 EXPLAINED = 3.0  # mean square of the innovations up to which the trusted friction is not replaced
-NUDGE = 1e-6  # of f_S, by which f_D is moved to see what the stem makes of it: no slip hangs on it
+NUDGE = 1e-4  # of f_S, by which f_D is moved to see what PV says of it: no slip hangs on it
 WORST = 2.0  # mean square of the innovations that a new friction may leave
 
 STATIC_SHARES = np.geomspace(0.2, 3.0, 92)  # steps of 3 %
@@ -249,7 +251,7 @@ def _changed(
     best, error = _best(evidence, valve, first, (found.static, found.dynamic))
     _, left = _gains(evidence, valve, first, np.array([best]))
     stems = evidence.stem[:, valve].copy()
-    stems[first:] = _stems(evidence, valve, first, *best)
+    stems[first:] = evidence.stems(valve, first, np.array([best]))[:, 0]
     share = evidence.share(valve, evidence.signature(valve, stems), first)
     plain = share.margin >= rule.change_margin and share.information >= INFORMATION
     low, high = static_interval(evidence, valve, first, best)
@@ -263,14 +265,25 @@ def _changed(
 def _refined_dynamic(
     evidence: Evidence, valve: int, first: int, static: float, dynamic: float
 ) -> tuple[float, float]:
-    """Return f_D by least squares from ``first`` on, and its standard error, %."""
-    error = static
+    """Return the likeliest f_D from ``first`` on, and its standard error, %.
+
+    While the moves stay as they are, the stem is linear in f_D, and the log likelihood a parabola.
+    """
+
+    def gains(tried: Sequence[float]) -> list[float]:
+        grid = np.column_stack([np.full(len(tried), static), tried])
+        return [float(gain) for gain in _gains(evidence, valve, first, grid)[0]]
+
+    error, nudge = static, NUDGE * static
     for _ in range(2):
-        step, error = _dynamic_step(evidence, valve, first, static, dynamic)
-        stepped = min(max(dynamic + step, 0.0), static)
-        pair = np.array([(static, dynamic), (static, stepped)])
-        before, after = _gains(evidence, valve, first, pair)[0]
-        if after < before:  # other moves than those that the step reckoned with
+        middle = min(max(dynamic, nudge), static - nudge)
+        low, here, high = gains([middle - nudge, middle, middle + nudge])
+        bend = 2.0 * here - low - high
+        if bend <= 0.0:  # it shows nowhere
+            break
+        error = nudge / math.sqrt(bend)
+        stepped = min(max(middle + 0.5 * nudge * (high - low) / bend, 0.0), static)
+        if gains([stepped])[0] < here:  # other moves than those that the step reckoned with
             break
         dynamic = stepped
     return dynamic, error + DYNAMIC_ERROR * static
@@ -278,26 +291,6 @@ def _refined_dynamic(
 
 def _around(dynamic: float, error: float) -> Interval:
     return max(dynamic - 3.0 * error, 0.0), dynamic + 3.0 * error
-
-
-def _stems(evidence: Evidence, valve: int, first: int, static: float, dynamic: float) -> FloatArray:
-    return evidence.stems(valve, first, np.array([[static, min(dynamic, static)]]))[:, 0]
-
-
-def _dynamic_step(
-    evidence: Evidence, valve: int, first: int, static: float, dynamic: float
-) -> tuple[float, float]:
-    """Return by how much f_D should change with the moves as they are, and its error, %."""
-    stems = _stems(evidence, valve, first, static, dynamic)
-    nudge = NUDGE * static * (-1.0 if dynamic > 0.5 * static else 1.0)
-    held = (_stems(evidence, valve, first, static, dynamic + nudge) - stems) / nudge
-    whole = evidence.stem[:, valve].copy()
-    whole[first:] = stems
-    changed = evidence.signature(valve, whole)
-    moved = evidence.stem[:, valve].copy()
-    moved[first:] += held
-    direction = evidence.signature(valve, moved)
-    return evidence.slope(changed, direction, first) or (0.0, static)
 
 
 def _rivals(
