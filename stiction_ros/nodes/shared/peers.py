@@ -9,6 +9,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 ABOVE = "../"  # before the name of a node that is in the namespace above
 TOPIC = "topic:"  # marks an entry of wait_for that names a topic; "/" and "~" do as well
@@ -129,16 +130,11 @@ class Peers:
 
     def unheard(self, inlets: dict[str, Inlet]) -> list[str]:
         """Return what lacks until no first message can be missed; empty when nothing does."""
-        missing, known = [], self._present()
+        missing = []
         for topic, inlet in inlets.items():
             full = self._node.resolve_topic_name(topic)
             found = self._node.get_publishers_info_by_topic(full)
-            names = {info.node_name for info in found}
-            missing += [
-                known.get(name) or f"{name} (does not publish {topic})"
-                for name in self.names
-                if known_as(name) in inlet.writers and _last(name) not in names
-            ]
+            missing += self._silent(inlet.writers, found, f"does not publish {topic}")
             usable = [i for i in found if _fit(i.qos_profile, inlet.qos)]
             if inlet.subscription.get_publisher_count() < len(usable):
                 missing.append(f"{topic} (not every publisher is matched)")
@@ -149,19 +145,12 @@ class Peers:
 
     def unlinked(self, outlets: dict[str, Outlet]) -> list[str]:
         """Return what lacks until all partners are ready and hear; empty when nothing does."""
-        missing, known = [], self._present()
-        for name in self.names:
-            if not self._announced(name):
-                missing.append(known.get(name) or f"{name} (not ready)")
+        unready = [name for name in self.names if not self._announced(name)]
+        missing = self._told(unready, "not ready")
         for topic, outlet in outlets.items():
             full = self._node.resolve_topic_name(topic)
             found = self._node.get_subscriptions_info_by_topic(full)
-            names = {info.node_name for info in found}
-            missing += [
-                known.get(name) or f"{name} (does not read {topic})"
-                for name in self.names
-                if known_as(name) in outlet.readers and _last(name) not in names
-            ]
+            missing += self._silent(outlet.readers, found, f"does not read {topic}")
             usable = [i for i in found if _fit(outlet.qos, i.qos_profile)]
             if outlet.publisher.get_subscription_count() < len(usable):
                 missing.append(f"{topic} (not every reader is matched)")
@@ -203,10 +192,18 @@ class Peers:
         found = self._node.get_publishers_info_by_topic(f"{space}/{name_there}/config")
         return frozenset(tuple(i.endpoint_gid) for i in found if i.node_name == _last(name))
 
-    def _present(self) -> dict[str, str]:
-        """Return what to say of the partners that are not in the graph at all."""
-        there = set(self._node.get_node_names())
-        return {n: f"{n} (no such node)" for n in self.names if _last(n) not in there}
+    def _silent(
+        self, asked: Sequence[str], found: Sequence[TopicEndpointInfo], what: str
+    ) -> list[str]:
+        """Return the partners among those ``asked`` that are not at a topic, and ``what`` lacks."""
+        names = {info.node_name for info in found}
+        away = [n for n in self.names if known_as(n) in asked and _last(n) not in names]
+        return self._told(away, what)
+
+    def _told(self, names: Sequence[str], what: str) -> list[str]:
+        """Return what is said of partners of which something lacks, or who are not there at all."""
+        there = set(self._node.get_node_names()) if names else set()
+        return [f"{n} ({what if _last(n) in there else 'no such node'})" for n in names]
 
     def _foreign_topics(self, own: Iterable[str]) -> list[str]:
         """Return the awaited topics that this node does not use and nobody publishes."""

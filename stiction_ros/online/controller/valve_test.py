@@ -29,6 +29,7 @@ class ValveTest:
     it does not allow for. OP then goes back to where it was, unless someone else has it.
 
     Attributes:
+        moves: of OP that were made.
         over: why it ended; empty while it runs.
         judgement: the last one; None before the second move has been held.
     """
@@ -48,17 +49,12 @@ class ValveTest:
         self.over = ""
         self.judgement: Judgement | None = None
         self._level, *self._levels = (facts.op, *first_round(facts).levels[:-1])
-        self._made, self._left = 0, hold
+        self.moves, self._left = 0, hold
         self._met = ""  # limit of PV that was met: OP is back, and what PV showed is judged
         self._late = max(math.ceil(facts.dead / facts.hold * hold), 1) + 1
         self._op: list[float] = []
         self._pv: list[float] = []
         self._work: Future[Judgement] | None = None
-
-    @property
-    def moves(self) -> int:
-        """Moves of OP that were made."""
-        return self._made
 
     def stop(self, reason: str) -> None:
         """End the test."""
@@ -107,7 +103,7 @@ class ValveTest:
     def _judged(self) -> bool:
         """Judge what was answered, where that is enough; return whether nothing is waited for."""
         if self._work is None:
-            if self._made < 2 or not measured_enough(np.array(self._pv), self._made):
+            if self.moves < 2 or not measured_enough(np.array(self._pv), self.moves):
                 return True
             signals = np.array(self._op), np.array(self._pv)
             self._work = self._background.submit(judged, *signals, self.facts.gain)
@@ -128,20 +124,20 @@ class ValveTest:
             if self.judgement.sure and self.judgement.known_to <= self._margin:
                 self.stop(self._told)
                 return
-            if self._made % 2 == 0 and not (
+            if self.moves % 2 == 0 and not (
                 self._levels and stays(self.facts, self.judgement, self._levels[:2])
             ):
                 plan = None
-                if self._made < MOST:
+                if self.moves < MOST:
                     plan = further_round(self.facts, self.judgement, 1)
                 self._levels = [] if plan is None else list(plan.levels[:-1])
         if not self._levels:
             self.stop(self._told or "PV shows hardly any value that is measured")
             return
-        if not self._made:
+        if not self.moves:
             if len(self._op) < RESTS * self.hold and not self._rests():
                 self._left = self.hold
                 return
             del self._op[: -self.hold], self._pv[: -self.hold]
         self._level, *self._levels = self._levels
-        self._made, self._left = self._made + 1, self.hold
+        self.moves, self._left = self.moves + 1, self.hold

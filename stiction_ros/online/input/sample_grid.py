@@ -43,30 +43,29 @@ class SampleGrid:
 
 
 class Succession:
-    """Refused stamps in succession; enough of them that rise belong to a new run."""
+    """Refused stamps in succession; enough of them that rise belong to a new run.
+
+    Attributes:
+        last: the stamp counted last, None for none.
+    """
 
     def __init__(self, standing: bool) -> None:
         """Start without any; ``standing``: a stamp that is shown again counts as well."""
         self._standing = standing
-        self._last: int | None = None
+        self.last: int | None = None
         self._count = 0
 
     def clear(self) -> None:
         """Begin to count anew: a stamp was accepted."""
-        self._last, self._count = None, 0
+        self.last, self._count = None, 0
 
     def add(self, stamp: int, follows: bool) -> bool:
         """Count a refused stamp, ns; tell whether it is that of a new run."""
-        last = self._last
+        last = self.last
         rises = last is not None and (stamp > last or (self._standing and stamp == last))
         self._count = self._count + 1 if rises and follows else 1
-        self._last = stamp
+        self.last = stamp
         return self._count >= SUCCESSION
-
-    @property
-    def last(self) -> int | None:
-        """The stamp counted last, None for none."""
-        return self._last
 
 
 class Pace:
