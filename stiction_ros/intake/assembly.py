@@ -1,7 +1,7 @@
 """The records of one loop from its blocks."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
@@ -18,8 +18,8 @@ from stiction_ros.intake.plausible import in_percent, refuse_swapped, refuse_twi
 from stiction_ros.intake.reported import at_pv, is_reported, on_grid
 from stiction_ros.intake.tables.block import Block, joined
 from stiction_ros.records.parts import ALIKE
-from stiction_ros.records.record import Record
-from stiction_ros.records.whole import Whole
+from stiction_ros.records.record import Quality, Record
+from stiction_ros.records.whole import Whole, carried
 from stiction_ros.texts import plural
 
 
@@ -102,7 +102,7 @@ def _records(
     own = at_pv(run, rules) if is_reported(run) else run
     if own is not None:
         try:
-            kept = _whole(repairs.filled(own, rules), found.record).records()
+            kept = _whole(own, found.record, rules).records()
             if wanted is None or all(abs(r.sample_time / wanted - 1.0) <= ALIKE for r in kept):
                 return kept
         except InputError:
@@ -113,33 +113,40 @@ def _records(
     parts: list[Record] = []
     stretches = on_grid(run, wanted, rules)
     for stretch in stretches:
-        parts += _whole(repairs.filled(stretch, rules), found.record).records()
+        parts += _whole(stretch, found.record, rules).records()
     if len(stretches) > 1:
         rules.told.append(f"cut at {len(stretches) - 1} gaps without a report")
     return tuple(parts)
 
 
-def _whole(block: Block, name: str) -> Whole:
-    valves, outputs = (tuple(key.tag for key in block.of(signal)) for signal in ("op", "pv"))
-
-    def side_by_side(signal: str, tags: Sequence[str]) -> FloatArray | None:
-        columns = {key.tag: column.values for key, column in block.of(signal).items()}
-        return np.column_stack([columns[t] for t in tags]) if {*columns} == {*tags} else None
-
-    op, pv = side_by_side("op", valves), side_by_side("pv", outputs)
-    if op is None or pv is None:
+def _whole(block: Block, name: str, rules: repairs.Rules) -> Whole:
+    tags = {signal: [key.tag for key in block.of(signal)] for signal in ("op", "pv")}
+    if not all(tags.values()):
         raise InputError("has no OP or no PV left")
+    signals: dict[str, FloatArray] = {}
+    for signal, of in (("op", "op"), ("pv", "pv"), ("sp", "pv"), ("stem", "op")):
+        columns = {key.tag: column for key, column in block.of(signal).items()}
+        if columns.keys() != set(tags[of]):
+            continue
+        sparse = next((c for c in columns.values() if np.isnan(c.values).mean() > 0.5), None)
+        if sparse is not None and signal != of:
+            rules.tell(f"{sparse.name} is missing at more than half of the rows, left out")
+            continue
+        values = [columns[tag].values for tag in tags[of]]
+        held = values if signal != "sp" else [carried(one, between=False) for one in values]
+        signals[signal] = np.column_stack(held)
+    whole = np.isfinite(np.hstack(list(signals.values()))).all(axis=1)
+    lacking = ~whole & (block.own_mask() != Quality.BAD)
+    if lacking.any() and rules.strict:
+        rules.tell(f"{plural(int(lacking.sum()), 'sample')} without every value")
     return Whole(
         name=name,
         where=str(block.path),
         place=block.place,
-        valves=valves,
-        outputs=outputs,
+        valves=tuple(tags["op"]),
+        outputs=tuple(tags["pv"]),
         time=block.time - block.time[0],
         start=block.clock.start + float(block.time[0]),
-        op=op,
-        pv=pv,
-        sp=side_by_side("sp", outputs),
-        stem=side_by_side("stem", valves),
+        signals=signals,
         mask=block.mask,
     )

@@ -1,7 +1,4 @@
-"""What is wrong with the rows of a loop: told, counted, and masked, held or cut by one rule.
-
-What is missing is held (OP, SP) or interpolated (PV) for up to :data:`HELD` samples, else bad.
-"""
+"""What is wrong with the rows of a loop: told, counted, left out or taken as missing."""
 
 import dataclasses
 import itertools
@@ -15,11 +12,10 @@ from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.intake.words import WORDS
 from stiction_ros.records.record import Quality
-from stiction_ros.records.regular import sample_time, spread_evenly
+from stiction_ros.records.regular import HELD, sample_time, spread_evenly
 from stiction_ros.signals.holds import stretches
 from stiction_ros.texts import plural
 
-HELD = 5  # samples in a row that are held at most; a gap in time is one from 5.5 samples on
 FAR = 5.0  # how many times the range of all other values a value is away that cannot belong to them
 SENTINEL_FAR = 0.5  # the same for numbers that stand for bad values
 
@@ -233,52 +229,3 @@ def outside(values: FloatArray) -> FlagArray:
         if np.max(ends - begins, initial=0) <= HELD and stray.sum() <= 0.02 * there.sum():
             found |= stray
     return found if np.count_nonzero(found) <= RARE * len(values) else np.zeros_like(found)
-
-
-def filled(block: Block, rules: Rules) -> Block:
-    """Return a block of one row a sample without missing values but in rows that are bad."""
-    mask = block.own_mask()
-    columns = dict(block.columns)
-    held, bad = np.zeros(len(mask), dtype=np.bool_), mask == Quality.BAD
-    given = bad.copy()
-    for key, column in block.measured.items():
-        missing = ~np.isfinite(column.values) & ~given
-        if not missing.any():
-            continue
-        if key.signal in ("sp", "stem") and missing.mean() > 0.5:
-            note = f"{column.name} is missing at more than half of the rows, left out"
-            rules.tell(note)
-            columns = {k: c for k, c in columns.items() if k.signal != key.signal}
-            continue
-        short, values = _carried(column.values, missing, block.time, key)
-        held |= short & (key.signal != "sp")
-        bad |= missing & ~short
-        columns[key] = dataclasses.replace(column, values=values)
-    held &= ~bad
-    mask[held & (mask == Quality.GOOD)] = Quality.HELD
-    mask[bad] = Quality.BAD
-    if held.any():
-        samples = plural(int(held.sum()), "sample")
-        rules.tell(f"{samples} held over at most {HELD} in a row (PV between its neighbours)")
-    if (bad & ~given).any():
-        rules.tell(f"{plural(int((bad & ~given).sum()), 'sample')} bad, cut out")
-    return dataclasses.replace(block, columns=columns, mask=mask if mask.any() else None)
-
-
-def _carried(
-    values: FloatArray, missing: FlagArray, time: FloatArray, key: Key
-) -> tuple[FlagArray, FloatArray]:
-    """Return which missing values can be held, or of PV and stem interpolated, and all values."""
-    short = missing.copy()
-    if key.signal != "sp":
-        for first, last in zip(*stretches(missing), strict=True):
-            short[first:last] = first > 0 and last < len(missing) and last - first <= HELD
-    there = np.flatnonzero(np.isfinite(values))
-    if not len(there):
-        return np.zeros_like(short), values
-    if key.signal in ("pv", "stem"):
-        carried = np.interp(time, time[there], values[there])
-    else:
-        before = np.searchsorted(there, np.arange(len(values)), side="right") - 1
-        carried = values[there[np.maximum(before, 0)]]
-    return short, np.where(short, carried, values)

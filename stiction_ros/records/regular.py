@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.errors import InputError
-from stiction_ros.records.record import Quality, QualityArray
 
 GAP = 5.5  # a step of more usual steps than this is a gap: the record is split there
+HELD = 5  # samples in a row that are held at most
 
 # share of the places that may be without a row, and the mean square by which steps may stray from
 # their mean, over that mean: rows missing at random make the one as large as the other
@@ -41,45 +41,9 @@ class Part:
     note: str = ""  # what was done; empty for nothing
 
     @property
-    def missing(self) -> NDArray[np.bool_]:
-        """Which times no row has, shape (N,)."""
-        found = np.ones(len(self.time), dtype=np.bool_)
-        found[self.place] = False
-        return found
-
-    @property
-    def left(self) -> IntArray:
-        """For each time the row, counted from ``first``, at or before it, shape (N,)."""
-        return np.cumsum(~self.missing) - 1
-
-    def interpolated(self, values: FloatArray) -> FloatArray:
-        """Return measured values, shape (rows, …), straight between rows, shape (N, …)."""
-        rows = values[self.first : self.last]
-        left, missing = self.left, np.flatnonzero(self.missing)
-        found = np.array(rows[left], dtype=np.float64)
-        before = left[missing]
-        width = self.place[before + 1] - self.place[before]
-        share = ((missing - self.place[before]) / width).reshape(-1, *[1] * (values.ndim - 1))
-        found[missing] += share * (rows[before + 1] - rows[before])
-        return found
-
-    def held(self, values: FloatArray) -> FloatArray:
-        """Return values that are held between two rows, such as OP and SP, shape (N, …)."""
-        return np.asarray(values[self.first : self.last][self.left])
-
-    def quality(self, mask: QualityArray | None) -> QualityArray | None:
-        """Return the mask at the regular times, of all rows' ``mask``, None when all are good."""
-        missing, left = self.missing, self.left
-        if mask is None and not missing.any():
-            return None
-        if mask is None:
-            mask = np.zeros(self.last, dtype=np.uint8)
-        rows = mask[self.first : self.last]
-        found = np.array(rows[left], dtype=np.uint8)
-        after = rows[np.minimum(left + 1, len(rows) - 1)]
-        found[missing & (after == Quality.BAD)] = Quality.BAD
-        found[missing & (found == Quality.GOOD)] = Quality.HELD
-        return found
+    def rows(self) -> IntArray:
+        """The row of the file at or before each time, shape (N,)."""
+        return self.first + np.searchsorted(self.place, np.arange(len(self.time)), side="right") - 1
 
 
 def split_at_gaps(time: FloatArray) -> list[tuple[int, int]]:
@@ -123,11 +87,6 @@ def regular_part(time: FloatArray, first: int, last: int) -> Part:
         said.append(f"stamps are rounded, samples are {step:.6g} s apart")
     elif worst > TOLERATED:
         said.append(f"sample times jitter by up to {worst:.0%}, taken as regular, {step:.6g} s")
-    if far:
-        said.append(
-            f"{far} of {number} samples missing between rows: pv and stem are interpolated, op "
-            "and sp held"
-        )
     return Part(first, last, given[0] + step * np.arange(number), place, "; ".join(said))
 
 

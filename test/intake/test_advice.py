@@ -177,7 +177,7 @@ def test_strict_refuses_what_times_of_each_tag_leave_open(
 ) -> None:
     rows = [[iso(k), str(pv(k)), iso(k + 9), str(op(k + 9))] for k in range(ROWS)]
     path = write(tmp_path / "a.csv", text(rows, ["Time", "F.PV", "Time", "F.OP"]))
-    assert "18 samples bad" in refused(path, capsys, "--strict")
+    assert "18 samples without every value" in refused(path, capsys, "--strict")
 
 
 def test_swapped_signals(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -41,9 +41,7 @@ def test_single_missing_rows_are_filled_and_counted(tmp_path: Path) -> None:
     assert len(record) == 100
     np.testing.assert_allclose(record.pv[:, 0], 2.0 * np.arange(100.0) + 1.0, rtol=1e-12)
     assert record.op[20, 0] == record.op[19, 0]
-    assert record.notes == (
-        "3 of 100 samples missing between rows: pv and stem are interpolated, op and sp held",
-    )
+    assert record.notes == ("3 samples held over at most 5 in a row (PV interpolated)",)
 
 
 def test_a_gap_splits(tmp_path: Path) -> None:

@@ -11,9 +11,8 @@ from stiction_ros.records.whole import Whole
 
 def read(times: np.ndarray, op: np.ndarray, pv: np.ndarray) -> Record:
     said = "loop", "loop.csv", lambda row: f"row {row}"
-    (record,) = Whole(
-        *said, ("V",), ("P",), times, 0.0, op[:, None], pv[:, None], None, None
-    ).records()
+    signals = {"op": op[:, None], "pv": pv[:, None]}
+    (record,) = Whole(*said, ("V",), ("P",), times, 0.0, signals).records()
     return record
 
 

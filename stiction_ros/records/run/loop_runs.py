@@ -122,6 +122,12 @@ class _Loop:
         op = self._op(number, pv, said)
         stamps = np.array(sorted(pv.keys() & op.keys()), dtype=np.int64)
         first = int(stamps[0]) if len(stamps) else 0
+        signals = {
+            "op": _at(stamps, op, len(self.valves)),
+            "pv": _at(stamps, pv, len(self.outputs)),
+            "sp": self._held(number, stamps, said),
+            "stem": self._stem(number, stamps, said),
+        }
         whole = Whole(
             name=Path(self._where).name,
             where=self._where,
@@ -130,10 +136,7 @@ class _Loop:
             outputs=self.outputs,
             time=(stamps - first) / 1e9,
             start=0.0,
-            op=_at(stamps, op, len(self.valves)),
-            pv=_at(stamps, pv, len(self.outputs)),
-            sp=self._held(number, stamps, said),
-            stem=self._stem(number, stamps, said),
+            signals={key: values for key, values in signals.items() if values is not None},
             cut_holes=True,
         )
         parts = whole.records(said)
