@@ -1,7 +1,6 @@
 """``stiction gap``: what a simulation misses, from records of the loop."""
 
 import argparse
-import math
 import shlex
 import sys
 from pathlib import Path
@@ -20,7 +19,6 @@ from stiction_ros.errors import InputError, storing
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 from stiction_ros.records.parts import longest_part, only_part
-from stiction_ros.texts import symbol
 
 if TYPE_CHECKING:
     from stiction_ros.discrepancy import Discrepancy
@@ -129,38 +127,19 @@ def _write(found: "Discrepancy", directory: Path) -> None:
 def _print(found: "Discrepancy", command: str) -> None:
     """Print the answer; to the ``command`` that was given a further record may be added."""
     from stiction_ros.discrepancy import GapVerdict
-    from stiction_ros.report.gap_words import called, plain
+    from stiction_ros.report.gap_words import called, lines_of, plain
 
     console = Console()
     names = ", ".join(record.name for record in found.runs.records)
     console.print(f"{names}: {found.verdict}", markup=False)
-    if found.effects:
-        table = Table(
-            *("effect", "figure", "value", "95 %", "ΔBIC", "closes"),
-            box=SIMPLE_HEAD,
-            pad_edge=False,
-        )
-        for effect in found.effects:
-            for k, (key, value) in enumerate(effect.parameters.items()):
-                ends = effect.intervals.get(key)
-                table.add_row(
-                    called(effect.place, effect.effect) if k == 0 else "",
-                    symbol(key),
-                    f"{value:.5g} {effect.units.get(key, '')}".removesuffix(" 1").rstrip(),
-                    "" if ends is None else f"{ends[0]:.5g} to {ends[1]:.5g}",
-                    f"{effect.delta_bic:.0f}" if k == 0 else "",
-                    "" if k or math.isnan(effect.closed) else f"{100.0 * effect.closed:.0f} %",
-                )
-        console.print(table)
-    elif found.alternatives:
-        console.print("one of: " + ", ".join(called(*name) for name in found.alternatives))
     for effect in found.effects:
-        others = " or ".join(called(*name) for name in effect.alternatives)
-        told = [effect.sentence, f"it may also be {others}" if others else ""]
-        if said := "; ".join(filter(None, told)):
-            law = "" if effect.law is None else f" (law {effect.law})"
-            name = called(effect.place, effect.effect)
-            console.print(f"{name}{law}: {plain(said)}", markup=False)
+        law = "" if effect.law is None else f" (law {effect.law})"
+        name = called(effect.place, effect.effect)
+        console.print(f"{name}{law}, ΔBIC {effect.delta_bic:.0f}", markup=False)
+        for line in lines_of(effect):
+            console.print(f"  {plain(line)}", markup=False)
+    if not found.effects and found.alternatives:
+        console.print("one of: " + ", ".join(called(*name) for name in found.alternatives))
     for change in found.process_changes:
         console.print(f"process to {change.output}: {change.sentence}", markup=False)
     console.print(_gaps(found))

@@ -221,18 +221,13 @@ def _tracks(found: Discrepancy, look: Look) -> str:
 
 def effect_card(effect: FoundEffect) -> str:
     """Return the box of one effect: place, law, figures with units, and why it."""
-    lines = say.figures_with_units(effect)
-    if effect.alternatives:
-        others = " or ".join(say.called(*name) for name in effect.alternatives)
-        lines.append(f"or {others}: these records do not tell them apart")
-    if np.isfinite(effect.closed):
-        lines.append(f"closes {100.0 * effect.closed:.0f} % of the gap by itself")
-    if effect.sentence:
-        lines.append(f"{effect.sentence}.")
     kind = "bad" if effect.verdict is GapVerdict.NAMED else "open"
     law = "" if effect.law is None else f" (law {effect.law})"
     return card(
-        kind, say.place_of(effect.place), say.word_of(effect.effect) + law, "\n".join(lines)
+        kind,
+        say.place_of(effect.place),
+        say.word_of(effect.effect) + law,
+        "\n".join(say.lines_of(effect)),
     )
 
 

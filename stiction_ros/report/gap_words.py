@@ -94,6 +94,17 @@ def figures_with_units(effect: FoundEffect) -> list[str]:
     return lines
 
 
+def lines_of(effect: FoundEffect) -> list[str]:
+    """Return what is said of an effect, one line each: figures, others like it, why it."""
+    lines = figures_with_units(effect)
+    if effect.alternatives:
+        others = " or ".join(called(*name) for name in effect.alternatives)
+        lines.append(f"or {others}: these records do not tell them apart")
+    if math.isfinite(effect.closed):
+        lines.append(f"closes {100.0 * effect.closed:.0f} % of the gap by itself")
+    return lines + ([f"{effect.sentence}."] if effect.sentence else [])
+
+
 def _digits(value: float, ends: tuple[float, float]) -> int:
     """Return how many digits of a figure show two of the width of its interval."""
     width = ends[1] - ends[0]
