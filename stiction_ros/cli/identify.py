@@ -3,11 +3,9 @@
 import argparse
 import shlex
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -17,10 +15,10 @@ from stiction_ros.cli.shared.as_json import write_json
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.errors import storing
 from stiction_ros.records.parts import longest_part
-from stiction_ros.texts import plural, probability, symbol
+from stiction_ros.texts import probability
 
 if TYPE_CHECKING:
-    from stiction_ros.identification import Identification, ValveEstimate
+    from stiction_ros.identification import Identification
 
 
 def add(commands: Any) -> None:
@@ -90,12 +88,11 @@ def run(options: argparse.Namespace) -> int:
         from stiction_ros.identification.answer.identified_loop import identified_loop
 
         searches.write_model(options.model, lambda name: identified_loop(record, found, name))
-    document = {"record": str(options.record)} | found.to_dict()
     if options.json is not None:
-        write_json(options.json, document)
+        write_json(options.json, {"record": str(options.record)} | found.to_dict())
     if options.json != "-":
         print(f"{loop.name}: {loop.summary}")
-        _print(document, found)
+        _print(str(options.record), found)
         if options.why:
             _print_figures(found)
     else:
@@ -111,44 +108,13 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _print(document: Mapping[str, Any], found: "Identification") -> None:
-    from stiction_ros.identification.answer.summary import cycle, materiality, next_step, rows, why
+def _print(record: str, found: "Identification") -> None:
+    from stiction_ros.identification.answer.summary import summary
 
-    console = Console()
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
-    further = _further(found)
-    table.add_column("valve", overflow="fold")
-    heads = ["verdict", "P", "f_S %", "interval", "f_D %", "interval"]
-    for name in (*heads, *(each for head in further.values() for each in (head, "interval"))):
-        table.add_column(name, no_wrap=True)
-    for valve, cells in zip(found.valves, rows(found), strict=True):
-        table.add_row(*cells, *(cell for key in further for cell in _cells(valve, key)))
-    console.print(table)
-    console.print(
-        "P: probability of friction. After a reversal OP goes back by f_S + f_D (deadband plus "
-        "stickband) before the stem moves; the stem jumps by f_S − f_D. All in % of travel."
-    )
-    if found.row_samples > 1:
-        used = found.row_samples * found.sample_time
-        console.print(f"Friction was judged at a coarser rate: one row each {used:g} s.")
-    for output in found.outputs:
-        delays = ", ".join(f"{k} {plural(lag, 'sample')}" for k, lag in output.delay.items())
-        console.print(
-            f"{output.name}: delay from {delays}; fit {output.fit_one_step:.1f} % one sample "
-            f"ahead, {output.fit_free_run:.1f} % from OP alone (free run); standard deviation of "
-            f"the noise {output.noise_std:.3g} PV units"
-        )
-        if output.cause is not None:
-            console.print(cycle(output))
-
-    for j, valve in enumerate(found.valves):
-        said = (why(found, j), materiality(valve), f"Next: {next_step(found, j)}")
-        console.print(f"{valve.name}: {' '.join(filter(None, said))}")
+    print(summary(found, notes=None))
     if any(valve.verdict == "undecided" for valve in found.valves):
-        planned = shlex.join(["stiction", "valve-test", "plan", document["record"]])
-        console.print(f"A test in manual that would decide: {planned}")
-    for note in found.notes:
-        console.print(f"note: {note}")
+        planned = shlex.join(["stiction", "valve-test", "plan", record])
+        print(f"A test in manual that would decide: {planned}")
 
 
 def _print_figures(found: "Identification") -> None:
@@ -173,24 +139,3 @@ def _print_figures(found: "Identification") -> None:
             row = name, f"{value:.3g}", told["unit"], f"{odds[name]:+.2f}", told["definition"]
             table.add_row(*row)
         console.print(table)
-
-
-def _further(found: "Identification") -> dict[str, str]:
-    """Return the heads of the columns of the law's further parameters, by their keys."""
-    from stiction_ros.identification.friction import find_law
-
-    heads = {}
-    for valve in found.valves:
-        for entry in find_law(valve.law).parameters()[2:] if valve.further else ():
-            name = symbol(entry.key)
-            heads[entry.key] = name if entry.unit == "1" else f"{name} {entry.unit}"
-    return heads
-
-
-def _cells(valve: "ValveEstimate", key: str) -> tuple[str, str]:
-    """Return value and interval of a further parameter; a constant of the law is held."""
-    if key not in valve.further:
-        return "", ""
-    ends = valve.further_intervals.get(key)
-    between = "held" if ends is None else "{:.3g} to {:.3g}".format(*ends)
-    return f"{valve.further[key]:.3g}", between

@@ -14,7 +14,7 @@ from stiction_ros.identification.result import (
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.texts import plural, probability, spoken
+from stiction_ros.texts import plural, probability, spoken, symbol
 
 WIDTH = 80  # columns of a terminal
 NOTES = 3  # notes that a summary shows
@@ -28,9 +28,12 @@ CAUSES: Mapping[CauseKind, str] = {
 }
 
 
-def summary(found: Identification) -> str:
-    """Return what was found in plain sentences, lines of 80 columns."""
+def summary(found: Identification, notes: int | None = NOTES) -> str:
+    """Return what was found in plain sentences, lines of 80 columns, with some ``notes`` or all."""
     lines = [f"{_size(found)}, {spoken(found.samples * found.sample_time)} of operation"]
+    if found.row_samples > 1:
+        used = found.row_samples * found.sample_time
+        lines.append(f"friction was judged at a coarser rate: one row each {used:g} s")
     if found.reason:
         lines += _wrapped(f"The fit is not to be trusted: {found.reason}", indent="")
     for j, valve in enumerate(found.valves):
@@ -46,10 +49,11 @@ def summary(found: Identification) -> str:
             lines += _wrapped(cycle(output))
     if found.notes:
         lines.append("")
-    for note in found.notes[:NOTES]:
+    shown = found.notes[:notes]
+    for note in shown:
         lines += textwrap.wrap(f"- {note}", WIDTH, subsequent_indent="  ")
-    if len(found.notes) > NOTES:
-        lines.append(f"- {plural(len(found.notes) - NOTES, 'more note')} in the attribute notes")
+    if left := len(found.notes) - len(shown):
+        lines.append(f"- {plural(left, 'more note')} in the attribute notes")
     return "\n".join(lines)
 
 
@@ -98,10 +102,15 @@ def _frictions(valve: ValveEstimate) -> str:
     if valve.verdict is VerdictKind.HEALTHY:
         return ""
     static, dynamic = valve.static_interval, valve.dynamic_interval
+    further = ""
+    for key, value in valve.further.items():
+        ends = valve.further_intervals.get(key)
+        between = "held" if ends is None else "{:.3g} to {:.3g}".format(*ends)
+        further += f", {symbol(key)} {value:.3g} ({between})"
     return (
         f"; f_S {valve.static_friction:.2f} % ({static[0]:.2f} to {static[1]:.2f} %), "
         f"f_D {valve.dynamic_friction:.2f} % ({dynamic[0]:.2f} to {dynamic[1]:.2f} %), "
-        f"law {valve.law}"
+        f"law {valve.law}{further}"
     )
 
 
