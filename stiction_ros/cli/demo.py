@@ -18,13 +18,11 @@ from stiction_ros.errors import InputError, storing
 if TYPE_CHECKING:
     from stiction_ros.online.session import Scenario
     from stiction_ros.online.unit import UnitScenario
+    from stiction_ros.report.run.report import RunReport
 
 
 OPCUA = "opcua"
 OPCUA_HELP = "; opcua: the tank behind a control system"
-
-# Scores of a phase that are printed, and what they are called
-SCORES = {"amplitude": "amplitude", "offset": "offset", "iae_per_hour": "IAE per hour"}
 
 
 def add(commands: Any) -> None:
@@ -119,7 +117,7 @@ def _run_scenario(
     log = read_run(directory / "bag")
     report = report_run(log, directory, scenario=scenario, seconds=seconds, load=load)
     show(1.0)
-    _print(report.summary, directory)
+    _print(report)
     return bool(report.summary["status"] == "ok")
 
 
@@ -145,45 +143,22 @@ def _report_unit(scenario: "UnitScenario", directory: Path, seconds: float) -> b
     return report.status == "ok"
 
 
-def _print(summary: dict[str, Any], directory: Path) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    from stiction_ros.report.run.summary import work_rows
-
-    console = Console()
-    name = summary["scenario"]
-    if summary["swap_time"] is None:
-        console.print(f"{name}: the controller was never swapped")
-    else:
-        valves = ", ".join(
-            f"{v['name']} {v['verdict']} (f_S {v['f_s']:.2f}, f_D {v['f_d']:.2f})"
-            for v in summary["valves"]
-        )
-        console.print(f"{name}: swapped at {summary['swap_time']:.0f} s; {valves}")
-    head = ("output", "", "before", "after", "stiction-free")
-    table = Table(*head, title=f"{name}, {summary['samples']} samples", title_justify="left")
-    phases = summary["phases"]
-    order = ("before", "after", "stiction_free")
-    rows = [
-        (output, label, [phases.get(phase, {}).get(output, {}).get(key) for phase in order])
-        for output in phases.get("before", {})
-        for key, label in SCORES.items()
-    ]
-    for tag, label, told in [*rows, *work_rows(summary, order)]:
-        table.add_row(tag, label, *("–" if value is None else f"{value:.4g}" for value in told))
-    console.print(table)
+def _print(report: "RunReport") -> None:
+    """Print what the page says first, and what is wrong with the run."""
+    name, summary = report.summary["scenario"], report.summary
+    for line in report.lines:
+        print(f"{name}: {line}")
     if summary["pv_to_op_ms"]:
         times = ", ".join(f"{key} {value:.3g}" for key, value in summary["pv_to_op_ms"].items())
         load = f"load {summary['load_before']:.2f} before the run"
-        console.print(f"{name}: PV to OP in ms: {times}; {load}")
+        print(f"{name}: PV to OP in ms: {times}; {load}")
     for topic, count in summary["messages"].items():
         lost = (count["published"] or 0) - count["recorded"]
         if lost > 0:
-            console.print(f"{name}: warning: {lost} messages of {topic} are not in the bag")
+            print(f"{name}: warning: {lost} messages of {topic} are not in the bag")
     if summary["status"] != "ok":
-        console.print(f"{name}: {summary['reason']}")
-    console.print(f"{directory / 'report.html'}")
+        print(f"{name}: {summary['reason']}")
+    print(report.page)
 
 
 def _make_empty(directory: Path) -> None:

@@ -339,10 +339,11 @@ def _growth(look: Mapping[str, Any]) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class RunReport:
-    """What was written: ``summary.json`` and the page."""
+    """What was written: ``summary.json`` and the page, and the lines with which it begins."""
 
     summary: dict[str, Any]
     page: Path
+    lines: tuple[str, ...]
 
 
 def report_run(
@@ -360,4 +361,5 @@ def report_run(
     """
     story = tell(log, scenario=scenario)
     figures = summary(story, seconds, load)
-    return RunReport(figures, write_page(out, run_page(story), figures))
+    page = write_page(out, run_page(story), figures)
+    return RunReport(figures, page, (headline(story), *findings(story)))
