@@ -39,16 +39,18 @@ def symbol(key: str) -> str:
     return {"f_s": "f_S", "f_d": "f_D"}.get(key, key.replace("_", " "))
 
 
-def spoken(seconds: float) -> str:
+def spoken(seconds: float | None) -> str:
     """Return a time of three digits in the unit that suits it: ``45.5 s``, ``4.78 h``, ``12.3 d``.
 
     Args:
-        seconds: not negative; whole ones are kept below an hour.
+        seconds: not negative; whole ones are kept below an hour; a dash where there is none.
 
     Examples:
         >>> spoken(45.52), spoken(1234.0), spoken(17210.0)
         ('45.5 s', '1234 s', '4.78 h')
     """
+    if seconds is None or not math.isfinite(seconds):
+        return "–"
     if seconds < HOUR:
         return f"{seconds:.3g} s" if seconds < 1000.0 else f"{seconds:.0f} s"
     size, unit = (HOUR, "h") if seconds < 2.0 * DAY else (DAY, "d")

@@ -24,7 +24,7 @@ from stiction_ros.errors import InputError, foreign, storing
 from stiction_ros.intake.sheets.cells import Numbers
 from stiction_ros.intake.sheets.layout import delimiter_of
 from stiction_ros.intake.sheets.text import open_text
-from stiction_ros.texts import probability
+from stiction_ros.texts import probability, spoken
 
 if TYPE_CHECKING:
     from stiction_ros.survey.entry import Entry
@@ -42,7 +42,6 @@ APART = 2  # blanks between two columns
 def print_list(found: "Survey", earlier: "Sequence[Earlier]") -> None:
     """Print the first rows, in the words of the page; ``earlier`` surveys begin with the oldest."""
     from stiction_ros.survey.listing.headline import changed, headline, worked
-    from stiction_ros.survey.pages.words import period
 
     entries = found.entries[:SHOWN]
     console = Console()
@@ -54,7 +53,7 @@ def print_list(found: "Survey", earlier: "Sequence[Earlier]") -> None:
         console.print(f"and {len(found.entries) - SHOWN} more")
     for group in found.groups:
         names = ", ".join(group.names)
-        console.print(f"group {group.number}, period {period(group.period)}: {names}")
+        console.print(f"group {group.number}, period {spoken(group.period)}: {names}")
     for line in changed(found.entries, earlier):
         console.print(line)
     console.print(headline(found), highlight=False)

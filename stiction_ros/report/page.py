@@ -94,17 +94,5 @@ def interval(ends: object) -> str:
     return f"{percent(ends[0])}\u00a0…\u00a0{percent(ends[1])}"
 
 
-def duration(seconds: float | None) -> str:
-    """Return a time for people: ``12 h 28 min``, ``45 min 54 s``, ``12.0 s``."""
-    if seconds is None or not math.isfinite(seconds):
-        return "–"
-    whole = round(seconds)
-    if whole >= 3600:
-        return f"{whole // 3600} h {whole % 3600 // 60} min"
-    if whole >= 120:
-        return f"{whole // 60} min {whole % 60} s" if whole % 60 else f"{whole // 60} min"
-    return f"{seconds:.1f} s"
-
-
 def _kind(kind: str) -> str:
     return f' class="{kind}"' if kind else ""

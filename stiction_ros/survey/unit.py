@@ -8,7 +8,7 @@ from stiction_ros.online.unit import UnitScenario
 from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.log import RunLog
-from stiction_ros.report.page import Cell, duration, number, table
+from stiction_ros.report.page import Cell, number, table
 from stiction_ros.report.run.figures import whole_run
 from stiction_ros.report.run.identified import KINDS, valve_cards
 from stiction_ros.report.run.report import mode_lines
@@ -17,6 +17,7 @@ from stiction_ros.report.run.story import Story, tell
 from stiction_ros.report.run.summary import summary
 from stiction_ros.signals.oscillation import amplitude, pieces
 from stiction_ros.survey.neighbours import Neighbours, is_outer, neighbours
+from stiction_ros.texts import spoken
 
 UNIT_COLUMNS = (
     *("loop", "valve", "verdict", "cycles by", "period, s", "behind, s"),
@@ -77,7 +78,7 @@ def unit_page(report: UnitReport) -> str:
     """Return the report of several loops as HTML."""
     headline, *said = report.found.sentences
     if report.swapped:
-        at = duration(report.stories[report.swapped].swap_time)
+        at = spoken(report.stories[report.swapped].swap_time)
         said.append(f"After {at} the controller of {report.swapped} was swapped.")
     parts = [
         f"<h1>{text(headline)}</h1>",

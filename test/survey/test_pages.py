@@ -12,7 +12,6 @@ from stiction_ros.survey.groups import Group
 from stiction_ros.survey.listing.headline import Earlier, in_words
 from stiction_ros.survey.listing.page import list_page
 from stiction_ros.survey.pages.loop_page import loop_page
-from stiction_ros.survey.pages.words import period
 from stiction_ros.survey.survey import Survey
 
 EARLIER = (
@@ -264,11 +263,6 @@ def test_the_unit_of_pv_stands_on_the_page(loop_file: Path) -> None:
     told = loop_file.read_text(encoding="utf-8")
     assert "m³/h" in told
     assert "PV units" not in told
-
-
-def test_times_are_told_as_people_say_them() -> None:
-    said = [period(seconds) for seconds in (61.0, 600.0, 9000.0, 1_478_251.0)]
-    assert said == ["61 s", "10 min", "2.5 h", "17.1 d"]
 
 
 def test_an_empty_survey_says_so() -> None:

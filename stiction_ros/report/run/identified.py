@@ -15,10 +15,10 @@ from stiction_ros.pages.plot import KINDS as COLOURS
 from stiction_ros.pages.plot import Curve, over_time
 from stiction_ros.pages.signals import Units
 from stiction_ros.records.record import Record
-from stiction_ros.report.page import Cell, card, duration, interval, number, percent, table
+from stiction_ros.report.page import Cell, card, interval, number, percent, table
 from stiction_ros.signals.free_run import step_response as answer_to_step
 from stiction_ros.signals.polynomials import largest_root
-from stiction_ros.texts import probability, symbol
+from stiction_ros.texts import probability, spoken, symbol
 
 if TYPE_CHECKING:
     from stiction_ros.report.run.story import Story  # it loads the controllers
@@ -106,7 +106,7 @@ def process_table(outputs: Sequence[Mapping[str, Any]], sample_time: float) -> s
                     valve,
                     ", ".join(number(v, 4) for v in output["a"]),
                     ", ".join(number(v, 4) for v in b),
-                    f"{delay} ({duration(delay * sample_time)})" if delay else "0",
+                    f"{delay} ({spoken(delay * sample_time)})" if delay else "0",
                     number(gain),
                     number(output["noise_std"]),
                     number(output["fit_one_step"]),

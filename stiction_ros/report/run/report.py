@@ -13,7 +13,6 @@ from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.page import (
     Cell,
     count,
-    duration,
     folded,
     interval,
     number,
@@ -26,6 +25,7 @@ from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import Story, tell
 from stiction_ros.report.run.summary import measured, messages, summary, work_rows
+from stiction_ros.texts import spoken
 
 _SCORES = (
     ("amplitude", "amplitude of the cycle", ""),
@@ -39,7 +39,7 @@ def run_page(story: Story) -> str:
     record = story.record
     kicker = (
         f"{len(record)} samples of {record.sample_time:g} s, "
-        f"{duration(len(record) * record.sample_time)} of operation"
+        f"{spoken(len(record) * record.sample_time)} of operation"
     )
     if story.seed is not None:
         kicker += f", seed {story.seed}"
@@ -77,7 +77,7 @@ def findings(story: Story) -> list[str]:
     """Return what the controller did, and what became of the cycle, in a few sentences."""
     lines, found = mode_lines(story), story.phases
     if found.cycle is not None and found.status is PhaseStatus.OK:
-        period = duration(found.cycle.period * story.record.sample_time)
+        period = spoken(found.cycle.period * story.record.sample_time)
         lines.append(f"Before, the loop cycled with a period of {period}. {_changes(story)}")
     return lines
 
@@ -94,7 +94,7 @@ def mode_lines(story: Story) -> list[str]:
         ]
         with_known = f", on trusting for {'; for '.join(known)}" if known else ""
         lines.append(
-            f"After {duration(story.swap_time)} the controller changed from unaware to "
+            f"After {spoken(story.swap_time)} the controller changed from unaware to "
             f"{swap.mode} between two samples{with_known}."
         )
         lines += _later_changes(story, swap)
@@ -112,7 +112,7 @@ def _later_changes(story: Story, swap: ModeChange) -> list[str]:
         if change.mode == mode:
             renewed += 1
             continue
-        at, mode = duration(story.log.seconds(change.stamp)), change.mode
+        at, mode = spoken(story.log.seconds(change.stamp)), change.mode
         lines.append(f"After {at} it changed to {mode}: {change.reason}.")
     if renewed:
         times = {1: "once", 2: "twice"}.get(renewed, f"{renewed} times")
@@ -211,7 +211,7 @@ def _spans(story: Story) -> str:
     said = []
     for name, phase in (("Before", before), ("after", after)):
         if phase is not None:
-            first, last = duration(phase.first * step), duration(phase.last * step)
+            first, last = spoken(phase.first * step), spoken(phase.last * step)
             said.append(f"{name}: {first if phase.first else 'start'} to {last}")
     text_ = "; ".join(said) + "."
     if after is not None and story.round_samples is None:
@@ -242,7 +242,7 @@ def _fits(story: Story) -> str:
             trusted = [percent(fit.trusted.get(f"{name}.{key}")) for key in ("f_s", "f_d")]
             rows.append(
                 [
-                    duration(log.seconds(fit.stamp)),
+                    spoken(log.seconds(fit.stamp)),
                     name,
                     (identified.KINDS.get(verdict, ""), verdict),
                     percent(valve["f_s"]),
@@ -318,7 +318,7 @@ def monitor_section(log: RunLog) -> str:
         outputs = look.get("outputs", {})
         rows.append(
             [
-                duration(log.seconds(stamp)),
+                spoken(log.seconds(stamp)),
                 ("bad", "grown") if look.get("grown") else "as in the baseline",
                 str(found.get("text", "")) or str(look.get("failure", "")),
                 ", ".join(f"{name} {_growth(one)}" for name, one in outputs.items()),

@@ -18,7 +18,7 @@ from stiction_ros.survey.listing.headline import (
     steps_of,
 )
 from stiction_ros.survey.pages import words as say
-from stiction_ros.texts import probability
+from stiction_ros.texts import probability, spoken
 
 Cell = tuple[str, object]  # HTML, and what it is sorted by; None stands last
 
@@ -153,12 +153,12 @@ def _test(entry: Entry) -> Cell:
     if entry.test is None:
         return "", None
     time, move = entry.test["duration"], entry.test["pv_move"]
-    return text(f"{say.period(time)}{'' if move is None else f', PV ±{say.figure(move)}'}"), time
+    return text(f"{spoken(time)}{'' if move is None else f', PV ±{say.figure(move)}'}"), time
 
 
 def _period(entry: Entry) -> Cell:
     period = None if entry.oscillation is None else entry.oscillation.period
-    return say.period(period), period
+    return "" if period is None else spoken(period), period
 
 
 def _amplitude(entry: Entry) -> Cell:

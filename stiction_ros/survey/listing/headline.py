@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from stiction_ros.survey.entry import Entry, Status
-from stiction_ros.survey.pages.words import period, signed_percent
+from stiction_ros.survey.pages.words import signed_percent
 from stiction_ros.survey.survey import Survey
-from stiction_ros.texts import plural
+from stiction_ros.texts import plural, spoken
 
 NAMED = 8  # loops that a sentence lists
 HEADS = {
@@ -67,7 +67,7 @@ def headline(survey: Survey) -> str:
 
 def worked(survey: Survey) -> str:
     """Return how many loops were done in which time, and how many of them were done before."""
-    loops, seconds = plural(len(survey.entries), "loop"), period(survey.seconds)
+    loops, seconds = plural(len(survey.entries), "loop"), spoken(survey.seconds)
     if not survey.before:
         return f"{loops} in {seconds}"
     here = len(survey.entries) - survey.before

@@ -7,8 +7,9 @@ from stiction_ros.report.page import card
 from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.listing.columns import COST, Column, columns_of
 from stiction_ros.survey.listing.headline import Earlier, changed, headline, kind_of, worked
-from stiction_ros.survey.pages.words import cause_words, period
+from stiction_ros.survey.pages.words import cause_words
 from stiction_ros.survey.survey import Survey
+from stiction_ros.texts import spoken
 
 SCRIPT = """
 const rows = [...document.querySelectorAll("table.list tbody tr")];
@@ -136,7 +137,7 @@ def _groups(survey: Survey) -> str:
     heads = (("", "group"), ("", "period"), ("t", "likely source"), ("t", "with it"))
     titles = "".join(f'<th scope="col" class="{kind}">{head}</th>' for kind, head in heads)
     rows = "".join(
-        f"<tr><td>{group.number}</td><td>{text(period(group.period))}</td>"
+        f"<tr><td>{group.number}</td><td>{text(spoken(group.period))}</td>"
         f"<td class='t'>{named(group.names[0])}</td>"
         f"<td class='t'>{', '.join(named(name) for name in group.names[1:])}</td></tr>"
         for group in survey.groups

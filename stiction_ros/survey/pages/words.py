@@ -46,16 +46,6 @@ def cause_words(cause: str | None) -> str:
     return "" if cause is None else CAUSES.get(cause, cause)
 
 
-def period(seconds: float | None) -> str:
-    """Return a time as people say it; nothing where there is none."""
-    if seconds is None or not math.isfinite(seconds):
-        return ""
-    for unit, size in (("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
-        if seconds >= 2.0 * size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds:.3g} s"
-
-
 def interval(ends: tuple[float, float] | None) -> str:
     """Return both ends; nothing where there are none."""
     return "" if ends is None else f"{figure(ends[0])} … {figure(ends[1])}"

@@ -9,12 +9,12 @@ from stiction_ros.identification import Identification
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import SCRIPT, Curve, against, over_time
 from stiction_ros.pages.signals import Units, all_signals
-from stiction_ros.report.page import Cell, card, duration, number, table
+from stiction_ros.report.page import Cell, card, number, table
 from stiction_ros.report.record_page import evidence_table
 from stiction_ros.report.run.identified import KINDS, process_table, responses, verdict_line
 from stiction_ros.report.run.story import TANK_UNITS
 from stiction_ros.signals.holds import set_point_moves
-from stiction_ros.texts import finite
+from stiction_ros.texts import finite, spoken
 from stiction_studies.examples.comparison import Against, Comparison, ValveComparison
 from stiction_studies.examples.example import Example
 from stiction_studies.examples.one_step import one_step_estimate
@@ -47,7 +47,7 @@ def report_example(
     record, units = example.record, Units("PV units", "% of travel", _units(example))
     kicker = (
         f"{VARIANTS[example.variant]}, seed {example.seed}; {len(record)} samples of "
-        f"{record.sample_time:g} s, {duration(len(record) * record.sample_time)} of operation"
+        f"{record.sample_time:g} s, {spoken(len(record) * record.sample_time)} of operation"
     )
     parts = [
         f"<h1>{text(headline)}</h1>",

@@ -13,10 +13,10 @@ from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.pages.signals import UNITS, View, over_record
 from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.run.log import RunLog, read_run
-from stiction_ros.report.page import duration, number, table, write_page
+from stiction_ros.report.page import number, table, write_page
 from stiction_ros.report.run.scoring import Phases, phases
 from stiction_ros.report.run.summary import measured, messages
-from stiction_ros.texts import finite
+from stiction_ros.texts import finite, spoken
 from stiction_studies.control_system.journal import transfer_steps
 
 JOURNAL = "journal.jsonl"  # of the simulated plant, beside the bag
@@ -149,12 +149,12 @@ def _story(summary: Mapping[str, Any], found: Phases) -> list[str]:
     lines = []
     if summary["swap_time"] is not None:
         friction = ", ".join(f"{key} {value:.2f}" for key, value in summary["friction"].items())
-        lines.append(f"friction found, controller swapped at {duration(summary['swap_time'])}")
+        lines.append(f"friction found, controller swapped at {spoken(summary['swap_time'])}")
         lines[-1] += f" ({friction})" if friction else ""
     for one in summary["transfers"]:
         who = "granted to the controller" if one["to"] == "remote" else "back with the plant"
         lines.append(
-            f"{duration(one['time'])}: {who} ({one['reason']}), OP stepped by {one['step']:.2f} %"
+            f"{spoken(one['time'])}: {who} ({one['reason']}), OP stepped by {one['step']:.2f} %"
         )
     if found.before is not None and found.after is not None:
         for name, before in found.before.scores.items():
@@ -175,12 +175,12 @@ def _page(log: RunLog, summary: Mapping[str, Any], transfers: Sequence[Transfer]
         (one.time, end) for one, end in zip(transfers, ends, strict=False) if one.to == "remote"
     ]
     swap = () if summary["swap_time"] is None else (summary["swap_time"],)
-    told = [(duration(one["time"]), one["state"], one["reason"]) for one in summary["grants"]]
+    told = [(spoken(one["time"]), one["state"], one["reason"]) for one in summary["grants"]]
     return framed(
         "A loop bridged by OPC UA",
         [
             "<h1>A loop bridged by OPC UA</h1>",
-            f'<p class="soft">{len(record)} samples in {duration(summary["seconds"])}</p>',
+            f'<p class="soft">{len(record)} samples in {spoken(summary["seconds"])}</p>',
             f"<ul>{''.join(f'<li>{text(line)}</li>' for line in summary['story'])}</ul>",
             "<p>Where it is shaded OP is written under the operator's grant; else the plant's own "
             "PIs have the valves. The dashed line is the swap to a controller that knows of the "
