@@ -1,6 +1,7 @@
 """``stiction survey``: every loop of a plant, ranked by what to service first."""
 
 import argparse
+import contextlib
 import csv
 import dataclasses
 import datetime
@@ -8,7 +9,8 @@ import importlib.util
 import json
 import os
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +20,8 @@ from rich.table import Table
 
 from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared.as_json import write_json
+from stiction_ros.cli.shared.progress import bar
 from stiction_ros.cli.shared.searches import add_law, delay_range
-from stiction_ros.cli.survey_progress import progress
 from stiction_ros.errors import InputError, foreign, storing
 from stiction_ros.intake.sheets.cells import Numbers
 from stiction_ros.intake.sheets.layout import delimiter_of
@@ -29,7 +31,7 @@ from stiction_ros.texts import probability, spoken
 if TYPE_CHECKING:
     from stiction_ros.survey.entry import Entry
     from stiction_ros.survey.listing.headline import Earlier
-    from stiction_ros.survey.survey import Survey
+    from stiction_ros.survey.survey import Reached, Survey
 
 LOCAL = "local"  # the engine of this machine
 
@@ -182,7 +184,8 @@ def run(options: argparse.Namespace) -> int:
     )
     earlier = _earlier(options.previous)
     engine = _engine(options)
-    again = loops(paths, reading) if options.engine == LOCAL else None
+    counted = options.engine == LOCAL and sys.stderr.isatty()
+    again = loops(paths, reading) if counted else None
     try:
         with progress(again) as show:
             found = survey(loops(paths, reading), plan, engine, show)
@@ -209,6 +212,32 @@ def run(options: argparse.Namespace) -> int:
     print(list_at, file=sys.stderr)
     statuses = {entry.status.value for entry in found.entries}
     return 1 if statuses == {"failed"} else 0
+
+
+@contextlib.contextmanager
+def progress(found: Iterable[object] | None) -> "Iterator[Callable[[Reached], None]]":
+    """Show how far a survey is: loops that are done, of all that there are.
+
+    The loops are found once more, to be counted beside the work; None where reading them twice
+    costs too much.
+    """
+    totals: list[int] = []
+
+    def count(loops: Iterable[object]) -> None:
+        with contextlib.suppress(ValueError, OSError):  # who judges the loops is told as well
+            totals.append(sum(1 for _ in loops))
+
+    def tell(reached: "Reached") -> None:
+        if not totals:
+            show(0.0, f"{reached.done} loops: {reached.entry.name}")
+            return
+        total = max(totals[0], reached.drawn)
+        show(reached.done / total, f"{reached.done} of {total} loops: {reached.entry.name}")
+
+    if found is not None:
+        threading.Thread(target=count, args=(found,), daemon=True).start()
+    with bar("survey") as show:
+        yield tell
 
 
 def _engine(options: argparse.Namespace) -> Any:

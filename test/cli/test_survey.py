@@ -1,16 +1,12 @@
 import json
-import time
 from pathlib import Path
 
 import pytest
 
 from stiction_ros.cli.main import main
-from stiction_ros.cli.survey_progress import Lines, progress
 from stiction_ros.errors import InputError
 from stiction_ros.survey import survey as surveying
 from stiction_ros.survey.engines import dask as dask_engine
-from stiction_ros.survey.entry import Entry, Status
-from stiction_ros.survey.survey import Reached
 
 
 @pytest.fixture(scope="module")
@@ -101,31 +97,6 @@ def test_an_interrupt_says_how_to_go_on(
     monkeypatch.setattr(surveying, "survey", interrupted)
     assert _code(["survey", str(exports), "--out", str(tmp_path)]) == 130
     assert "interrupted; --resume goes on" in capsys.readouterr().err
-
-
-def test_a_file_is_told_of_the_loops_that_are_done(capsys: pytest.CaptureFixture[str]) -> None:
-    entry = Entry("FIC1", (), Status.OK)
-    with progress(None) as tell:
-        tell(Reached(1, 2, entry))
-    with progress([]) as tell:
-        time.sleep(0.2)
-        tell(Reached(50, 60, entry))
-    said = capsys.readouterr().err
-    assert said.startswith("survey: 50 of 60 loops: FIC1")
-
-
-def test_a_file_gets_a_line_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
-    now = [0.0]
-    lines = Lines(lambda: now[0])
-    for done in range(1, 101):
-        lines(done / 200, f"{done}")
-    now[0] = 31.0
-    lines(0.501, "later")
-    assert capsys.readouterr().err.split("\n") == [
-        *(f"survey: {done}" for done in (20, 40, 60, 80, 100)),
-        "survey: later",
-        "",
-    ]
 
 
 def test_a_path_that_is_not_there_is_said(capsys: pytest.CaptureFixture[str]) -> None:
