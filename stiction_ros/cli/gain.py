@@ -13,20 +13,10 @@ from stiction_ros.cli.shared.progress import bar
 from stiction_ros.cli.shared.searches import add_law
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
-from stiction_ros.gain.advice import advice
+from stiction_ros.gain.advice import MEASURES, advice
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.set_points import SetPoints
 from stiction_ros.texts import probability
-
-MEASURES = {
-    "amplitude": "amplitude",
-    "iae_per_hour": "mean |PV−SP|",
-    "travel_per_hour": "stem travel %/h",
-    "moves_per_hour": "stem moves/h",
-    "reversals_per_hour": "stem reversals/h",
-    "period": "period s",
-}
-"""Measures in the order in which they are printed, and what they are called."""
 
 
 def add(commands: Any) -> None:
@@ -122,7 +112,8 @@ def show(found: Any, verdict: Mapping[str, Any]) -> None:
         table.add_section()
     console.print(table)
     console.print(
-        "now: as recorded; then: simulated; –: not promised. Amplitude and |PV−SP| in PV units."
+        "now: as recorded; then: simulated; –: not promised. Amplitude and |PV−SP| in PV units, "
+        "travel in %."
     )
     for option in found.options:
         console.print(f"{option.what}: {option.note}", highlight=False)

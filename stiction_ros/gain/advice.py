@@ -6,6 +6,16 @@ from typing import Any
 PROMISED = 0.10
 """Share of now from which on less is a promise: then each drawn loop must become better, too."""
 
+MEASURES = {
+    "amplitude": "amplitude",
+    "iae_per_hour": "mean |PV−SP|",
+    "travel_per_hour": "stem travel/h",
+    "moves_per_hour": "stem moves/h",
+    "reversals_per_hour": "stem reversals/h",
+    "period": "period, s",
+}
+"""Measures in the order in which they are shown, and what they are called."""
+
 NAMES = {
     "service": "a service of the valve",
     "embedding": "the controller that knows the friction (embedding)",

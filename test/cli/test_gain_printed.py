@@ -37,7 +37,7 @@ def test_a_terminal_of_80_columns_is_enough(
     assert "does not decide" in " ".join(out.splitlines())
     assert "0.139 │ 0.121 │ 0.101 to 0.139" in " ".join(out.split())
     assert "1000 to 1200" in out
-    assert out.count("period s") == 1  # where it is another one
+    assert out.count("period, s") == 1  # where it is another one
     assert "98.8 │ 21.5" in " ".join(out.split())
     assert f"service: {NOTE[:50]}" in out
     assert "friction promises" not in out

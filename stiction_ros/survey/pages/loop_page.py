@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from stiction_ros.gain.advice import advice
+from stiction_ros.gain.advice import MEASURES, advice
 from stiction_ros.identification import Identification
 from stiction_ros.pages.frame import text
 from stiction_ros.pages.signals import UNITS, Units
@@ -19,14 +19,6 @@ OPTIONS = {
     "embedding": "controller that knows the friction",
     "retune": "retune",
     "leave": "leave it",
-}
-MEASURES = {
-    "amplitude": "amplitude",
-    "period": "period, s",
-    "iae_per_hour": "mean |PV−SP|",
-    "travel_per_hour": "travel/h",
-    "moves_per_hour": "moves/h",
-    "reversals_per_hour": "reversals/h",
 }
 
 
