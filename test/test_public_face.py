@@ -1,10 +1,8 @@
 """What `from stiction_ros import …` gives, and that its documentation is true."""
 
-import ast
 import dataclasses
 import doctest
 import enum
-import importlib
 import inspect
 import re
 import subprocess
@@ -34,22 +32,6 @@ def test_every_name_is_there_and_listed() -> None:
     assert set(NAMES) <= set(dir(stiction_ros))
     for name in NAMES:
         assert getattr(stiction_ros, name) is not None
-
-
-def test_type_checkers_see_the_same_names() -> None:
-    source = Path(stiction_ros.__file__).read_text(encoding="utf-8")
-    guarded = next(node for node in ast.parse(source).body if isinstance(node, ast.If))
-    *imports, renamed = guarded.body
-    assert ast.unparse(renamed) == "find_gap = find_discrepancy"
-    seen = {}
-    for node in imports:
-        assert isinstance(node, ast.ImportFrom)
-        for alias in node.names:
-            seen[alias.asname or "find_gap"] = (node.module, alias.name)
-    assert set(seen) == set(NAMES)
-    for name, (module, there) in seen.items():
-        home = importlib.import_module(str(module))
-        assert getattr(home, there) is getattr(stiction_ros, name)
 
 
 def test_another_name_is_refused_as_python_does() -> None:

@@ -110,13 +110,13 @@ def explained(text: str, names: list[str]) -> bool:
 
 def public_homes(root: Path) -> dict[str, tuple[str, str]]:
     """Return of each public name the module that has it, and its name there."""
-    tree = ast.parse((root / PACKAGE / "__init__.py").read_text(encoding="utf-8"))
-    for node in tree.body:
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOMES":
-            homes = ast.literal_eval(node.value)
-            parts = {name: home.partition(":") for name, home in homes.items()}
-            return {name: (module, there or name) for name, (module, _, there) in parts.items()}
-    return {}
+    stub = ast.parse((root / PACKAGE / "__init__.pyi").read_text(encoding="utf-8"))
+    return {
+        alias.asname or "find_gap": (str(node.module).removeprefix(f"{PACKAGE}."), alias.name)
+        for node in stub.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
 
 
 def public_functions(root: Path, sources: list[Source]) -> dict[str, bool]:

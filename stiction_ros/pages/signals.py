@@ -48,7 +48,7 @@ class View:
     shade: tuple[tuple[float, float], ...] = ()
 
 
-UNITS = Units()
+UNITS: Units = Units()
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,8 +11,8 @@ import stiction_ros
 
 ROOT = Path(__file__).resolve().parents[2]
 
-INIT = '''"""A package."""
-_HOMES = {"told": "loop.model", "Loop": "loop.model", "alias": "loop.model:hidden"}
+STUB = '''"""A package."""
+from stiction_ros.loop.model import Loop as Loop, hidden as alias, told as told
 '''
 MODEL = '''"""A module.
 
@@ -72,7 +72,7 @@ def house() -> ModuleType:
 def tree(tmp_path: Path) -> Path:
     folder = tmp_path / "stiction_ros" / "loop"
     folder.mkdir(parents=True)
-    (folder.parent / "__init__.py").write_text(INIT)
+    (folder.parent / "__init__.pyi").write_text(STUB)
     (folder / "__init__.py").write_text('"""Empty."""\n')
     (folder / "model.py").write_text(MODEL)
     return tmp_path
