@@ -18,7 +18,7 @@ from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError, storing
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
-from stiction_ros.records.parts import longest_part, only_part
+from stiction_ros.records.parts import longest_part
 
 if TYPE_CHECKING:
     from stiction_ros.discrepancy import Discrepancy
@@ -112,7 +112,7 @@ def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
 
 def _record(path: str, options: argparse.Namespace) -> Record:
     loop = intake.opened(argparse.Namespace(**{**vars(options), "record": path}))
-    return longest_part([only_part(loop.parts, path)])
+    return longest_part(loop.parts)
 
 
 def _write(found: "Discrepancy", directory: Path) -> None:

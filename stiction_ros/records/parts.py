@@ -1,4 +1,4 @@
-"""The parts of a record that has gaps: the only one, the longest good one, all in one."""
+"""The parts of a record that has gaps: the longest good one, or all in one."""
 
 import dataclasses
 import datetime
@@ -7,34 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.record import Gap, Quality, Record
+from stiction_ros.records.record import Gap, Record
 
 DATES = 3e8  # seconds from which a time is shown as a date: 1979
 ALIKE = 0.01  # sample times of two parts, one over the other, that count as the same
-
-
-def only_part(parts: Sequence[Record], where: str) -> Record:
-    """Return the one part that there is; InputError for several, or for bad samples."""
-    convert = f"stiction convert writes its {len(parts)} parts as records of their own"
-    if len(parts) > 1:
-        before, after = parts[0], parts[1]
-        end = before.start + float(before.time[-1])
-        if after.start <= end:
-            raise InputError(
-                f"holds more than one run: time falls back from {end:.9g} s to {after.start:.9g} s",
-                where=where,
-                fix=convert,
-            )
-        raise InputError(
-            f"has {len(parts) - 1} gap{'s' * (len(parts) > 2)}, the first of "
-            f"{after.start - end:.6g} s behind {end - before.start:.6g} s",
-            where=where,
-            fix=convert,
-        )
-    bad = int(np.count_nonzero(parts[0].quality == Quality.BAD))
-    if bad:
-        raise InputError(f"has {bad} bad sample{'s' * (bad > 1)}", where=where, fix="cut it there")
-    return parts[0]
 
 
 def longest_part(parts: Sequence[Record]) -> Record:

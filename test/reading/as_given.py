@@ -9,7 +9,6 @@ from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions, OpUnit
 from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.records.bag.run_metadata import merged
 from stiction_ros.records.csv_writer import tagged_columns
-from stiction_ros.records.parts import only_part
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.loop_runs import read_bag_parts
 from stiction_ros.records.storage.files import storage_files
@@ -38,10 +37,10 @@ def read_csv(
 
     Raises:
         InputError: no such file or column; a cell that is empty, not a number or not
-            finite; time that does not increase, is irregular or has gaps; fewer than two
-            rows.
+            finite; time that does not increase or is irregular; fewer than two rows.
     """
-    return only_part(read_csv_parts(path, CsvColumns(op, pv, sp, stem, time)), str(path))
+    (only,) = read_csv_parts(path, CsvColumns(op, pv, sp, stem, time))
+    return only
 
 
 def read_csv_parts(
@@ -86,9 +85,10 @@ def open_record(
     """Read a record without gaps from a CSV file or a bag, as :func:`open_parts` does.
 
     Raises:
-        InputError: as there; gaps, several runs, bad samples.
+        InputError: as there.
     """
-    return only_part(open_parts(path, columns, namespace=namespace), str(path))
+    (only,) = open_parts(path, columns, namespace=namespace)
+    return only
 
 
 def open_parts(

@@ -8,7 +8,6 @@ import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
 from stiction_ros.records.bag.writer import BagWriter
-from stiction_ros.records.parts import only_part
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.loop_runs import read_bag_parts
 from stiction_ros.records.storage.bag_metadata import Qos
@@ -21,7 +20,8 @@ LATCHED = Qos(depth=1, durability="transient_local")
 
 def read_bag(path: Path, namespace: str | None = None) -> Record:
     """Return the one record of a loop in a bag."""
-    return only_part(read_bag_parts(path, namespace=namespace), str(path))
+    (only,) = read_bag_parts(path, namespace=namespace)
+    return only
 
 
 def message(type_name: str, *fields: object) -> object:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.csv_writer import write_csv
-from stiction_ros.records.parts import joined, longest_part, only_part
+from stiction_ros.records.parts import joined, longest_part
 from stiction_ros.records.record import Gap, Quality, Record, Segment
 from stiction_ros.records.run.loop_runs import read_bag_parts
 
@@ -197,14 +197,6 @@ def test_the_longest_good_part_is_named() -> None:
     with pytest.raises(InputError, match="has no good samples"):
         longest_part([record([B] * 10)])
     assert longest_part([record()]).notes == ()
-
-
-def test_only_one_good_part_is_one_record() -> None:
-    assert only_part([record()], "r").notes == ()
-    with pytest.raises(InputError, match="r: has 1 bad sample; "):
-        only_part([record([B] + [G] * 9)], "r")
-    with pytest.raises(InputError, match="more than one run: time falls back from 23 s to 5 s"):
-        only_part([record(), record()], "r")
 
 
 def test_gaps_and_runs_go_through_a_bag(tmp_path: Path) -> None:

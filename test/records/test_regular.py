@@ -2,7 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from as_given import read_csv, read_csv_parts
+from as_given import read_csv_parts
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -57,12 +57,6 @@ def test_a_row_alone_between_two_gaps_is_left_out_and_told(tmp_path: Path) -> No
     parts = parts_of(tmp_path, times)
     assert [len(p) for p in parts] == [50, 30]
     assert "1 rows alone between two gaps left out" in parts[0].notes
-
-
-def test_one_record_is_never_made_over_a_gap(tmp_path: Path) -> None:
-    parts_of(tmp_path, np.concatenate([np.arange(50.0), 80.0 + np.arange(30.0)]))
-    with pytest.raises(InputError, match=r"has 1 gap, the first of 31 s behind 49 s; stiction con"):
-        read_csv(tmp_path / "loop.csv")
 
 
 def test_what_is_more_than_slightly_irregular_is_refused(tmp_path: Path) -> None:
