@@ -32,50 +32,10 @@ class LoopRun:
     def __len__(self) -> int:
         return sum(len(part) for part in self.parts)
 
-
-def loop_runs(
-    signals: LoopSignals, namespace: str | None, notes: Sequence[str]
-) -> tuple[LoopRun, ...]:
-    """Join what was collected of a loop to its runs, at least one, in the order of their begin.
-
-    A stamp counts when ``pv`` and ``op`` both have it; where ``op_applied`` tells what the
-    valves were given, that is taken for ``op``, and alone it will do, as where nobody but the
-    plant's own controller gives an OP. ``sp`` is held from one message to the next;
-    ``stem`` is dropped with a note when a stamp lacks it.
-
-    Raises:
-        InputError: no such loop; no usable message of ``pv`` or ``op``; in no run are two
-            samples regular.
-    """
-    try:
-        space = signals.loop(namespace)
-    except InputError as error:
-        unread = [note.removesuffix(", left out") for note in notes if "cannot be decoded" in note]
-        if unread:
-            what = f"{error.what} that can be read: {', '.join(unread)}"
-            fix = "record it again with definitions in ros2msg, as `ros2 bag record -s mcap` does"
-            raise InputError(what, where=error.where, fix=fix) from None
-        raise
-    loop = _Loop(signals, space)
-    said = [*notes, *loop.notes]
-    found: list[LoopRun] = []
-    refused: list[InputError] = []
-    for number in range(len(loop.runs)):
-        try:
-            found.append(loop.run(number, said))
-        except InputError as error:
-            refused.append(error)
-    if not found:
-        raise refused[0]
-    if refused:
-        note = f"{len(refused)} runs left out: {refused[0].what}"
-        found = [
-            dataclasses.replace(
-                run, parts=tuple(dataclasses.replace(p, notes=(*p.notes, note)) for p in run.parts)
-            )
-            for run in found
-        ]
-    return tuple(found)
+    def noting(self, note: str) -> "LoopRun":
+        """Return the run with a note more on each part."""
+        parts = (dataclasses.replace(part, notes=(*part.notes, note)) for part in self.parts)
+        return dataclasses.replace(self, parts=tuple(parts))
 
 
 class _Loop:
@@ -266,8 +226,41 @@ class BagLoops:
         return cls(signals, messages, recorded, seconds, notes)
 
     def runs(self, namespace: str | None) -> tuple[LoopRun, ...]:
-        """Return the runs of a loop by :func:`loop_runs`."""
-        return loop_runs(self.signals, namespace, self.notes)
+        """Join what was collected of a loop to its runs, at least one, in the order of their begin.
+
+        A stamp counts when ``pv`` and ``op`` both have it; where ``op_applied`` tells what the
+        valves were given, that is taken for ``op``, and alone it will do, as where nobody but the
+        plant's own controller gives an OP. ``sp`` is held from one message to the next;
+        ``stem`` is dropped with a note when a stamp lacks it.
+
+        Raises:
+            InputError: no such loop; no usable message of ``pv`` or ``op``; in no run are two
+                samples regular.
+        """
+        try:
+            space = self.signals.loop(namespace)
+        except InputError as error:
+            said = [n.removesuffix(", left out") for n in self.notes if "cannot be decoded" in n]
+            if not said:
+                raise
+            what = f"{error.what} that can be read: {', '.join(said)}"
+            fix = "record it again with definitions in ros2msg, as `ros2 bag record -s mcap` does"
+            raise InputError(what, where=error.where, fix=fix) from None
+        loop = _Loop(self.signals, space)
+        notes = [*self.notes, *loop.notes]
+        found: list[LoopRun] = []
+        refused: list[InputError] = []
+        for number in range(len(loop.runs)):
+            try:
+                found.append(loop.run(number, notes))
+            except InputError as error:
+                refused.append(error)
+        if not found:
+            raise refused[0]
+        if refused:
+            note = f"{len(refused)} runs left out: {refused[0].what}"
+            found = [run.noting(note) for run in found]
+        return tuple(found)
 
     def parts(self, namespace: str | None) -> tuple[Record, ...]:
         """Return the records of a loop."""

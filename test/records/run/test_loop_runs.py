@@ -19,7 +19,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.intake import CsvColumns
 from stiction_ros.records.bag.messages import BagMessage, read_messages, read_raw
 from stiction_ros.records.record import Quality
-from stiction_ros.records.run.loop_runs import LoopRun, loop_runs, read_bag_parts
+from stiction_ros.records.run.loop_runs import BagLoops, LoopRun, read_bag_parts
 from stiction_ros.records.run.loop_signals import JOINT_STATE, LoopSignals
 
 STEP = 10**8  # ns between two samples
@@ -64,7 +64,7 @@ def read(messages: list[Message]) -> tuple[LoopRun, ...]:
     signals = LoopSignals("bag")
     for number, message in enumerate(messages):
         signals.add(of(message), number)
-    return loop_runs(signals, None, [])
+    return BagLoops(signals, [], {}, 0.0, []).runs(None)
 
 
 @st.composite
