@@ -1,6 +1,5 @@
 """Turns the journals of a bag writer into a finished rosbag2 bag."""
 
-import dataclasses
 import os
 from collections import Counter
 from collections.abc import Sequence
@@ -10,33 +9,12 @@ from typing import Any
 import yaml
 from mcap.writer import CompressionType, Writer
 
-from stiction_ros.errors import InputError
 from stiction_ros.records.bag.run_metadata import RUN, custom_data, merged
 from stiction_ros.records.storage.bag_metadata import VERSION, BagTopic, yaml_text
 from stiction_ros.records.storage.files import METADATA, found_files
 from stiction_ros.records.storage.mcap_scan import McapScan
 
 ROSBAG2 = "rosbag2"
-COMPRESSIONS = {
-    "zstd": CompressionType.ZSTD,
-    "lz4": CompressionType.LZ4,
-    "none": CompressionType.NONE,
-}
-
-
-@dataclasses.dataclass(frozen=True)
-class Packing:
-    """How a finished file is packed: ``zstd``, ``lz4`` or ``none``, and bytes in a chunk."""
-
-    compression: str = "zstd"
-    chunk_size: int = 1 << 18
-
-    def __post_init__(self) -> None:
-        if self.compression not in COMPRESSIONS:
-            raise InputError(
-                f"compression {self.compression!r} is not known",
-                fix=f"use {', '.join(COMPRESSIONS)}",
-            )
 
 
 def storage_path(directory: Path, number: int = 0) -> Path:
@@ -44,12 +22,13 @@ def storage_path(directory: Path, number: int = 0) -> Path:
     return directory / f"{directory.resolve().name}_{number}.mcap"
 
 
-def finish_bag(directory: str | Path, packing: Packing = Packing()) -> None:
+def finish_bag(directory: str | Path, compression: str = "zstd", chunk_size: int = 1 << 18) -> None:
     """Rewrite the journals of a bag chunked and indexed and write its ``metadata.yaml``.
 
     What was received before simulated time was known (configurations, latched topics) came at wall
     time, years away; it gets the first simulated time. A journal is replaced when the new file is
-    complete on the disk, so that a second kill loses nothing either.
+    complete on the disk, so that a second kill loses nothing either. Chunks of ``chunk_size`` bytes
+    are packed by ``zstd``, ``lz4`` or ``none``.
 
     Raises:
         InputError: no journal there, or a damaged one.
@@ -58,7 +37,8 @@ def finish_bag(directory: str | Path, packing: Packing = Packing()) -> None:
     directory = Path(directory)
     files = found_files(directory)
     pairs = zip(files, log_time_caps(files), strict=True)
-    write_listing(directory, [rewrite(McapScan(file, cap=cap), packing) for file, cap in pairs])
+    whole = [rewrite(McapScan(file, cap=cap), compression, chunk_size) for file, cap in pairs]
+    write_listing(directory, whole)
 
 
 def log_time_caps(files: Sequence[Path]) -> list[int | None]:
@@ -77,15 +57,15 @@ def log_time_caps(files: Sequence[Path]) -> list[int | None]:
     return [None] * len(files)
 
 
-def rewrite(scan: McapScan, packing: Packing = Packing()) -> McapScan:
+def rewrite(scan: McapScan, compression: str = "zstd", chunk_size: int = 1 << 18) -> McapScan:
     """Rewrite a file chunked and indexed, in its place; return the scan, which is then complete."""
     partial = scan.path.with_suffix(".mcap.part")
     try:
         with partial.open("wb") as output:
             target = Writer(
                 output,
-                chunk_size=packing.chunk_size,
-                compression=COMPRESSIONS[packing.compression],
+                chunk_size=chunk_size,
+                compression=CompressionType[compression.upper()],
                 use_summary_offsets=False,  # it writes them for groups that are empty, too
                 enable_data_crcs=True,
             )

@@ -13,18 +13,12 @@ from mcap.records import Channel, Header, McapRecord, Message, Metadata, Schema
 
 from stiction_ros import __version__
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.finish import (
-    ROSBAG2,
-    Packing,
-    finish_bag,
-    metadata_record,
-    storage_path,
-)
+from stiction_ros.records.bag.finish import ROSBAG2, finish_bag, metadata_record, storage_path
 from stiction_ros.records.bag.run_metadata import RUN, news
 from stiction_ros.records.storage.bag_metadata import BagTopic, Qos, qos_yaml
 from stiction_ros.records.storage.mcap_scan import MAGIC, McapScan
 
-__all__ = ["BagWriter", "Packing", "Qos", "Splitting"]
+__all__ = ["BagWriter", "Qos", "Splitting"]
 _BLOCK = 1 << 20
 
 
@@ -124,11 +118,12 @@ class BagWriter:
     def __init__(
         self,
         directory: str | Path,
-        packing: Packing = Packing(),  # noqa: B008 (frozen)
+        compression: str = "zstd",
         splitting: Splitting = Splitting(),
+        chunk_size: int = 1 << 18,
     ) -> None:
         self.directory = Path(directory)
-        self._packing = packing
+        self._packing = compression, chunk_size
         self._splitting = splitting
         self._limited = splitting.size > 0 or splitting.duration > 0
         self._topics: dict[str, BagTopic] = {}
@@ -216,7 +211,7 @@ class BagWriter:
         self.put_back()
         self._closed = True
         self._journal.close()
-        finish_bag(self.directory, self._packing)
+        finish_bag(self.directory, *self._packing)
 
     def __enter__(self) -> "BagWriter":
         return self

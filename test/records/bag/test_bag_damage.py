@@ -11,7 +11,7 @@ from bag_trials import trials
 from mcap.writer import CompressionType, Writer
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.finish import Packing, finish_bag
+from stiction_ros.records.bag.finish import finish_bag
 from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.bag.repair import RepairStatus, repair_bag
 from stiction_ros.records.bag.writer import BagWriter
@@ -25,7 +25,7 @@ Message = tuple[str, int, bytes]
 
 def own_bag(directory: Path, compression: str) -> Path:
     """Return the file of a finished bag in several chunks."""
-    bag = Bag(BagWriter(directory, Packing(compression, 1 << 14)))
+    bag = Bag(BagWriter(directory, compression, chunk_size=1 << 14))
     bag.text("/plant/config", "seed: 7\nversion: '0.1'", 4 * SECOND)
     bag.put("/clock", "rosgraph_msgs/msg/Clock", clock(5 * SECOND), 5 * SECOND)
     bag.loop(SAMPLES)

@@ -11,7 +11,6 @@ from bag_making import SECOND, Bag, clock, read_bag
 from rosbags.rosbag2 import Reader
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.finish import Packing
 from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.bag.repair import RepairStatus, repair_bag
 from stiction_ros.records.bag.writer import BagWriter, Splitting
@@ -21,7 +20,7 @@ CONFIG = "node: /plant\nversion: '0.1'\nseed: 7\n"
 
 
 def split_bag(directory: Path, splitting: Splitting) -> Bag:
-    bag = Bag(BagWriter(directory, Packing(), splitting))
+    bag = Bag(BagWriter(directory, splitting=splitting))
     bag.text("/plant/config", CONFIG, 5 * SECOND)
     bag.loop(100)
     bag.text("/loop_model", "loop: tank", 110 * SECOND)
@@ -122,7 +121,7 @@ def test_a_killed_writer_of_many_files_is_repaired(split: Bag, tmp_path: Path) -
 
 def test_messages_before_the_clock_get_its_time_across_files(tmp_path: Path) -> None:
     wall = 1_790_000_000 * SECOND
-    bag = Bag(BagWriter(tmp_path / "run", Packing(), Splitting(size=2500)))
+    bag = Bag(BagWriter(tmp_path / "run", splitting=Splitting(size=2500)))
     for number in range(40):
         bag.text("/mode", "unaware", wall + number)
     bag.writer.add_metadata(SIMULATED, {"first": str(5 * SECOND)})
@@ -166,7 +165,7 @@ def test_what_metadata_says_is_compared_with_the_files(split: Bag) -> None:
 
 
 def test_the_time_of_a_file_counts_from_simulated_time(tmp_path: Path) -> None:
-    bag = Bag(BagWriter(tmp_path / "run", Packing(), Splitting(duration=100 * SECOND)))
+    bag = Bag(BagWriter(tmp_path / "run", splitting=Splitting(duration=100 * SECOND)))
     bag.text("/plant/config", CONFIG, 1_790_000_000 * SECOND)
     bag.loop(50)
     bag.writer.close()
@@ -203,7 +202,7 @@ def refused(*_args: object) -> None:
 
 def test_only_what_came_before_simulated_time_gets_the_first_one(tmp_path: Path) -> None:
     """Also when a later file begins with other messages than the first on ``/clock``."""
-    bag = Bag(BagWriter(tmp_path / "run", Packing(), Splitting(duration=3 * SECOND)))
+    bag = Bag(BagWriter(tmp_path / "run", splitting=Splitting(duration=3 * SECOND)))
     wall = 1_700_000_000 * SECOND
     for _ in range(3):
         bag.text("/plant/config", CONFIG, wall)

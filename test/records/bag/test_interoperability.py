@@ -8,7 +8,6 @@ from bag_making import JOINT_STATE, SECOND, STORE, Bag, joint_state, read_bag
 from foreign_readers import by_us, check, checker, differences
 from mcap.writer import CompressionType, Writer
 
-from stiction_ros.records.bag.finish import Packing
 from stiction_ros.records.bag.repair import repair_bag
 from stiction_ros.records.bag.writer import BagWriter, Splitting
 
@@ -23,17 +22,16 @@ def fill(bag: Bag) -> None:
 
 
 CASES = {
-    "zstd": (Packing("zstd"), Splitting()),
-    "lz4": (Packing("lz4"), Splitting()),
-    "none": (Packing("none", 4096), Splitting()),
-    "split": (Packing("zstd", 4096), Splitting(size=20000)),
+    "zstd": ("zstd", Splitting(), 1 << 18),
+    "lz4": ("lz4", Splitting(), 1 << 18),
+    "none": ("none", Splitting(), 4096),
+    "split": ("zstd", Splitting(size=20000), 4096),
 }
 
 
 @pytest.fixture(params=[*CASES, "repaired"])
 def path(request, tmp_path: Path) -> Path:
-    packing, splitting = CASES.get(request.param, CASES["split"])
-    bag = Bag(BagWriter(tmp_path / "run", packing, splitting))
+    bag = Bag(BagWriter(tmp_path / "run", *CASES.get(request.param, CASES["split"])))
     fill(bag)
     if request.param == "repaired":
         repair_bag(tmp_path / "run")

@@ -20,7 +20,7 @@ from rosbags.rosbag2 import Reader
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.finish import finish_bag
 from stiction_ros.records.bag.messages import read_messages, read_raw
-from stiction_ros.records.bag.writer import BagWriter, Packing
+from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.storage.bag_metadata import Qos
 from stiction_ros.records.storage.log_time import SIMULATED
 
@@ -128,7 +128,7 @@ def test_any_bytes_come_back(
 ) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bag"
-        with BagWriter(path, Packing(compression, chunk_size)) as writer:
+        with BagWriter(path, compression, chunk_size=chunk_size) as writer:
             for topic in ("/a", "/b", "/unit/c"):
                 writer.add_topic(topic, "std_msgs/msg/String", "string data\n", "", LATCHED)
             for topic, time, data in messages:
@@ -157,7 +157,7 @@ def test_a_killed_writer_loses_nothing_and_is_repaired(bag: Bag, tmp_path: Path)
 
 KILLED = """
 import sys
-from stiction_ros.records.bag.writer import BagWriter, Packing
+from stiction_ros.records.bag.writer import BagWriter
 writer = BagWriter(sys.argv[1])
 writer.add_topic("/mode", "std_msgs/msg/String", "string data\\n", "")
 k = 0

@@ -19,7 +19,7 @@ from stiction_ros.cli.shared.node_processes import require_ros, ros_environment
 from stiction_ros.cli.shared.progress import Bar
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import read_raw
-from stiction_ros.records.bag.writer import BagWriter, Packing
+from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.storage.mcap_scan import RawMessage
 from stiction_studies.benches.speed.graph import record_run
 from stiction_studies.benches.speed.row import Row, row
@@ -71,7 +71,7 @@ def _cpu_of(
 
 
 def _write_bag(directory: Path, messages: Sequence[RawMessage], compression: str) -> None:
-    with BagWriter(directory, Packing(compression)) as writer:
+    with BagWriter(directory, compression) as writer:
         for topic in dict.fromkeys(message.topic for message in messages):
             writer.add_topic(topic.name, topic.type, topic.definition, topic.type_hash)
         for _ in range(ROUNDS):
