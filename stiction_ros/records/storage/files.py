@@ -1,8 +1,7 @@
 """Which files a bag is made of, and whether ``metadata.yaml`` tells the truth of them."""
 
-import contextlib
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import yaml
@@ -15,20 +14,28 @@ METADATA = "metadata.yaml"
 
 
 class Listing:
-    """What ``metadata.yaml`` of a bag tells; what cannot be read of it is an InputError."""
+    """What ``metadata.yaml`` of a bag tells; what cannot be read of it is an InputError.
+
+    Attributes:
+        files: its files; one that is there packed, or unpacked, in its place counts as well.
+        counts: messages by topic.
+        compression_mode: ``FILE``, ``MESSAGE`` or empty, in whatever letters.
+    """
 
     def __init__(self, directory: Path) -> None:
         self.directory, self.where = directory, directory / METADATA
-        with self._readable():
-            told = yaml.safe_load(self.where.read_text(encoding="utf-8"))
-            self._told = {**told["rosbag2_bagfile_information"]}
-            self._version = int(self._told["version"])
-            self._storage = str(self._told["storage_identifier"] or "")
-
-    @contextlib.contextmanager
-    def _readable(self) -> Iterator[None]:
         try:
-            yield
+            document = yaml.safe_load(self.where.read_text(encoding="utf-8"))
+            told = {**document["rosbag2_bagfile_information"]}
+            self._version = int(told["version"])
+            self._storage = str(told["storage_identifier"] or "")
+            self.files = tuple(_there(directory, name) for name in told["relative_file_paths"])
+            topics = told["topics_with_message_count"]
+            self.counts = {
+                str(entry["topic_metadata"]["name"]): int(entry["message_count"])
+                for entry in topics
+            }
+            self.compression_mode = str(told.get("compression_mode") or "")
         except Exception as error:  # any text may stand there, and YAML's readers raise anything
             raise InputError(
                 f"cannot be read ({type(error).__name__})",
@@ -36,32 +43,11 @@ class Listing:
                 fix="make it anew with `stiction repair`",
             ) from None
 
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """Its files; one that is there packed, or unpacked, in its place counts as well."""
-        with self._readable():
-            return tuple(_there(self.directory, name) for name in self._told["relative_file_paths"])
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Messages by topic."""
-        with self._readable():
-            return {
-                str(entry["topic_metadata"]["name"]): int(entry["message_count"])
-                for entry in self._told["topics_with_message_count"]
-            }
-
-    @property
-    def compression_mode(self) -> str:
-        """``FILE``, ``MESSAGE`` or empty, in whatever letters."""
-        return str(self._told.get("compression_mode") or "")
-
     def refuse_foreign(self) -> None:
         """Raise where the bag is of another kind."""
         storage = self._storage
         if not storage.strip():  # rosbag2 looks at the files then
-            names = listed_names(self.directory)
-            storage = "sqlite3" if any(".db3" in name for name in names) else "mcap"
+            storage = "sqlite3" if any(".db3" in file.name for file in self.files) else "mcap"
         if self._version > VERSION:
             said = f"has version {self._version}, newer than {VERSION}"
             raise InputError(said, where=str(self.where))
