@@ -34,13 +34,10 @@ class TagRow:
     # what it says of that file: a column ``time``, and fields of the options
     options: Mapping[str, object] = dataclasses.field(default_factory=dict)
 
-    @property
-    def file_name(self) -> str:
-        """Name of the file without its folders."""
-        return _parts(self.file)[-1] if _parts(self.file) else ""
-
     def names(self, path: Path) -> bool:
         """Tell whether the row is one of a file."""
+        if not self.file.endswith(path.name):  # as most are
+            return False
         wanted = _parts(self.file)
         return bool(wanted) and _parts(str(path.absolute()))[-len(wanted) :] == wanted
 
@@ -150,7 +147,7 @@ class TagList:
 
     loops: Mapping[str, Tag]  # name of the loop, signal, for each tag in small letters
     units: Mapping[str, OpUnit]  # unit of OP of loops of which the list says it
-    rows: Mapping[str, Sequence[TagRow]]  # rows for one file, by its name
+    rows: Sequence[TagRow]  # rows for one file alone
 
     def way_of(self, path: Path, options: IntakeOptions) -> FileWay:
         """Return how a file is read; InputError if its rows contradict each other."""
@@ -174,7 +171,7 @@ class TagList:
 
     def _rows_of(self, path: Path) -> list[TagRow]:
         """Return the rows that count for one file alone."""
-        return [row for row in self.rows.get(path.name, ()) if row.names(path)]
+        return [row for row in self.rows if row.names(path)]
 
     def refuse_ambiguous(self, files: Sequence[Path]) -> None:
         """Raise an :class:`InputError` where a row names several files."""
@@ -191,8 +188,7 @@ class TagList:
     def strange(self, files: Sequence[Path]) -> list[str]:
         """Return the files of rows that are none of ``files``."""
         there = {row.file for file in files for row in self._rows_of(file)}
-        named = dict.fromkeys(row.file for rows in self.rows.values() for row in rows)
-        return [file for file in named if file not in there]
+        return [file for file in dict.fromkeys(row.file for row in self.rows) if file not in there]
 
 
 def read_tag_list(path: Path) -> TagList:
@@ -204,12 +200,8 @@ def read_tag_list(path: Path) -> TagList:
     with foreign(path):
         rows = read_rows(path)
     general = [row for row in rows if not row.file]
-    of_files: dict[str, list[TagRow]] = {}
-    for row in rows:
-        if row.file:
-            of_files.setdefault(row.file_name, []).append(row)
     units = {row.loop: row.unit for row in general if row.unit is not None}
-    return TagList(_by_tag(general), units, of_files)
+    return TagList(_by_tag(general), units, [row for row in rows if row.file])
 
 
 def _by_tag(rows: Sequence[TagRow]) -> dict[str, Tag]:
