@@ -9,11 +9,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray, IntArray
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.repairs import Rules
-from stiction_ros.intake.tables.block import Block, Column, Key
-from stiction_ros.records.record import Quality, QualityArray
+from stiction_ros.intake.tables.block import Block, FlagArray, Key
+from stiction_ros.records.record import Quality
 from stiction_ros.records.regular import GAP
 from stiction_ros.texts import plural
 
@@ -42,28 +42,20 @@ def at_pv(block: Block, rules: Rules) -> Block | None:
     if len(outputs) != 1 or len(stamps[outputs[0]]) < COVERED * max(map(len, stamps.values())):
         return None
     begin = max((stamps[key][0] for key in block.of("op") if len(stamps[key])), default=0)
-    chosen = ~block.columns[outputs[0]].blank & (block.time >= begin)
-    time = block.time[chosen]
+    time = stamps[outputs[0]]
+    time = time[time >= begin]
     if len(time) < 2:
         return None
-    mask: QualityArray = np.zeros(len(time), dtype=np.uint8)
-    columns = {}
-    for key, at in stamps.items():
-        if not len(at):
-            continue
-        before, values = _last(block.columns[key], at, time)
-        if key.signal == "op":  # none came since the row before
-            mask[time - at[before] > 1.5 * float(np.median(np.diff(time)))] = Quality.HELD
-        if key.signal != "mode":
-            values[before < 0] = np.nan
-        columns[key] = dataclasses.replace(block.columns[key], values=values, blank=before < 0)
     rules.tell(
         f"OP and PV have stamps of their own: taken at the {len(time)} of PV, with the last value "
         "of OP and SP at each",
         "leave --strict out, or export all tags at the same times",
     )
-    rows = np.flatnonzero(chosen)
-    return dataclasses.replace(block.rows(rows), columns=columns, mask=_mask(block, rows, mask))
+    of_op = [at for key in block.of("op") if len(at := stamps[key])]
+    step = float(np.median(np.diff(time)))
+    ages = [time - at[np.searchsorted(at, time, side="right") - 1] for at in of_op]
+    held = np.max(ages, axis=0) > 1.5 * step  # none came since the row before
+    return _at(block, stamps, time, step, held)
 
 
 def on_grid(block: Block, sample_time: float | None, rules: Rules) -> list[Block]:
@@ -93,7 +85,15 @@ def on_grid(block: Block, sample_time: float | None, rules: Rules) -> list[Block
     steps = np.diff(every)
     longest = max(GAP * float(np.percentile(steps, 99.0)), QUIET * step)
     stretches = np.split(every, np.flatnonzero(steps > longest) + 1)
-    found = [_regular(block, stamps, one, step) for one in stretches if len(one) > 1]
+    found = []
+    for first, last in ((one[0], one[-1]) for one in stretches if len(one) > 1):
+        time = first + step * np.arange(math.floor((last - first) / step + 1e-6) + 1)
+        far = []  # from every report
+        for at in needed.values():
+            after = np.minimum(np.searchsorted(at, time + 1e-6 * step, side="right"), len(at) - 1)
+            around = at[np.maximum(after - 1, 0)], at[after]
+            far.append(np.min(np.abs(np.subtract(around, time)), axis=0) > 0.5 * step)
+        found.append(_at(block, stamps, time, step, np.any(far, axis=0)))
     samples = sum(len(one.time) for one in found)
     rules.tell(
         f"reports when values changed ({', '.join(counts)}) brought onto {samples} samples of "
@@ -109,16 +109,30 @@ def _reports(block: Block) -> dict[Key, FloatArray]:
     return {key: block.time[~column.blank] for key, column in block.columns.items()}
 
 
-def _last(column: Column, at: FloatArray, time: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return which report is the last one at each time, -1 for none yet, and its value."""
-    before = np.searchsorted(at, time, side="right") - 1
-    return before, column.values[~column.blank][np.maximum(before, 0)]
+def _at(
+    block: Block, stamps: Mapping[Key, FloatArray], time: FloatArray, step: float, held: FlagArray
+) -> Block:
+    """Return samples at some times: PV and stem straight between reports, others as they were last.
 
-
-def _mask(block: Block, rows: IntArray, mask: QualityArray) -> QualityArray:
-    """Return the quality of samples: that of the rows that they are taken of, else ``mask``."""
-    given = block.own_mask()[rows]
-    return np.where(given != Quality.GOOD, given, mask)
+    A sample has the quality of the row before it; of good ones some are ``held``.
+    """
+    until = time + 1e-6 * step
+    columns = {}
+    for key, at in stamps.items():
+        given = block.columns[key].values[~block.columns[key].blank]
+        there = np.isfinite(given)
+        if not there.any():
+            continue
+        before = np.searchsorted(at, until, side="right") - 1
+        values = np.where(before < 0, np.nan, given[np.maximum(before, 0)])
+        if key.signal in ("pv", "stem"):
+            between = np.interp(time, at[there], given[there])
+            values = np.where(np.isfinite(values), between, np.nan)
+        columns[key] = dataclasses.replace(block.columns[key], values=values, blank=before < 0)
+    rows = np.maximum(np.searchsorted(block.time, until, side="right") - 1, 0)
+    mask = block.own_mask()[rows]
+    mask[held & (mask == Quality.GOOD)] = Quality.HELD
+    return dataclasses.replace(block.rows(rows), time=time, columns=columns, mask=mask)
 
 
 def _scan(stamps: list[FloatArray]) -> float:
@@ -134,33 +148,3 @@ def _scan(stamps: list[FloatArray]) -> float:
     span = float(busiest[-1] - busiest[0])
     dense = span / smallest / (DENSEST * len(busiest))
     return smallest * max(math.ceil(dense), 1)
-
-
-def _regular(
-    block: Block, stamps: Mapping[Key, FloatArray], stretch: FloatArray, step: float
-) -> Block:
-    """Return one stretch on a grid, with samples marked that no report is near."""
-    count = math.floor((stretch[-1] - stretch[0]) / step + 1e-6) + 1
-    time = stretch[0] + step * np.arange(count)
-    until = time + 1e-6 * step
-    mask: QualityArray = np.zeros(count, dtype=np.uint8)
-    columns = {}
-    for key, column in block.columns.items():
-        at, given = stamps[key], column.values[~column.blank]
-        there = np.isfinite(given)
-        if not there.any():
-            continue
-        before, values = _last(column, at, until)
-        if key.signal in ("op", "pv"):
-            around = at[np.maximum(before, 0)], at[np.minimum(before + 1, len(at) - 1)]
-            far = np.min(np.abs(np.subtract(around, time)), axis=0) > 0.5 * step
-            mask[far] = Quality.HELD
-        if key.signal in ("pv", "stem"):
-            between = np.interp(time, at[there], given[there])
-            values = np.where(np.isfinite(values), between, np.nan)
-        columns[key] = dataclasses.replace(column, values=values, blank=np.zeros(count, dtype=bool))
-    rows = np.maximum(np.searchsorted(block.time, until, side="right") - 1, 0)
-    mask, lines = _mask(block, rows, mask), np.arange(count)
-    return dataclasses.replace(
-        block, row_word="sample", time=time, lines=lines, columns=columns, mask=mask
-    )
