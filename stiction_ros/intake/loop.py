@@ -64,13 +64,12 @@ def spreads_of(blocks: Sequence[Block]) -> dict[str, str]:
 
 def spreads_of_records(parts: Sequence[Record]) -> dict[str, str]:
     """Return the same of records, whose OP is in %."""
-    found: list[tuple[str, FloatArray]] = []
-    for part in parts:
-        found += zip((f"OP {tag}" for tag in part.valves), part.op.T, strict=True)
-        found += zip((f"PV {tag}" for tag in part.outputs), part.pv.T, strict=True)
-        if part.sp is not None:
-            found += zip((f"SP {tag}" for tag in part.outputs), part.sp.T, strict=True)
-    return _spreads(found)
+    signals = [(part, key, values) for part in parts for key, values in part.signals.items()]
+    return _spreads(
+        (f"{key.upper()} {tag}", column)
+        for part, key, values in signals
+        for tag, column in zip(part.tags(key), values.T, strict=True)
+    )
 
 
 def modes_of(blocks: Sequence[Block], taken: Mapping[str, str]) -> tuple[str, ...]:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError, storing
 from stiction_ros.records.record import Quality, Record
 
@@ -59,13 +58,9 @@ def write_csv(
     plain = (record.valves, record.outputs) == ((DEFAULT_VALVE,), (DEFAULT_OUTPUT,))
     times = _iso(record) if iso else [repr(t) for t in (record.start + record.time).tolist()]
     header, columns = ["t"], [times]
-    for key, name in SIGNALS.items():
-        values: FloatArray | None = getattr(record, key)
-        if values is None:
-            continue
-        tags = record.valves if key in ("op", "stem") else record.outputs
-        for tag, column in zip(tags, values.T, strict=True):
-            header.append(name if plain else column_name(key, tag))
+    for key, values in record.signals.items():
+        for tag, column in zip(record.tags(key), values.T, strict=True):
+            header.append(SIGNALS[key] if plain else column_name(key, tag))
             columns.append(["" if math.isnan(x) else repr(x) for x in column.tolist()])
     if modes is not None:
         header.append(MODE)

@@ -3,6 +3,7 @@
 import dataclasses
 import datetime
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -55,19 +56,15 @@ def joined(parts: Sequence[Record]) -> Record:
             f"{model.sample_time:g} s left out"
         )
     ends = np.cumsum([len(part) for part in kept]).tolist()
-    optional = {}
-    for key in ("sp", "stem"):
-        values = [getattr(part, key) for part in kept]
-        known = [value for value in values if value is not None]
-        optional[key] = np.concatenate(known) if len(known) == len(kept) else None
-        if known and len(known) < len(kept):
+    signals: dict[str, Any] = {"sp": None, "stem": None}
+    for key in dict.fromkeys(key for part in kept for key in part.signals):
+        if all(key in part.signals for part in kept):
+            signals[key] = np.concatenate([part.signals[key] for part in kept])
+        else:
             notes.append(f"{key} is not known in every part, left out")
     return dataclasses.replace(
         model,
-        op=np.concatenate([part.op for part in kept]),
-        pv=np.concatenate([part.pv for part in kept]),
-        sp=optional["sp"],
-        stem=optional["stem"],
+        **signals,
         start=kept[0].start,
         notes=tuple(notes),
         mask=np.concatenate([part.quality for part in kept]),

@@ -107,14 +107,10 @@ class Record:
         if self.gaps and not all(before < after for before, after in itertools.pairwise(rows)):
             raise InputError(f"gaps at samples {rows[1:-1]} of {count}", where=self.name)
         bad = None if self.mask is None else self.mask == Quality.BAD
-        widths = {"op": self.valves, "pv": self.outputs, "sp": self.outputs, "stem": self.valves}
-        for key, tags in widths.items():
-            values = getattr(self, key)
-            if values is None:
-                continue
-            values = np.array(values, dtype=float)
-            if values.shape != (count, len(tags)):
-                said = f"{key} has shape {values.shape}, not {(count, len(tags))}"
+        for key, given in self.signals.items():
+            values, wanted = np.array(given, dtype=float), (count, len(self.tags(key)))
+            if values.shape != wanted:
+                said = f"{key} has shape {values.shape}, not {wanted}"
                 raise InputError(said, where=self.name, fix="Record.from_arrays takes vectors, too")
             if not np.isfinite(values).all():
                 wrong = ~np.isfinite(values).all(axis=1)
@@ -230,13 +226,23 @@ class Record:
 
     def __repr__(self) -> str:
         signals = [f"OP of {', '.join(self.valves)}", f"PV of {', '.join(self.outputs)}"]
-        signals += [key for key in ("sp", "stem") if getattr(self, key) is not None]
+        signals += list(self.signals)[2:]
         cut = f" in {len(self.gaps) + 1} segments" if self.gaps else ""
         size = f"{len(self)} samples of {self.sample_time:g} s{cut}"
         return f"<Record {self.name}: {size}; {', '.join(signals)}>"
 
     def __len__(self) -> int:
         return len(self.op)
+
+    @property
+    def signals(self) -> dict[str, FloatArray]:
+        """The signals that are known, by the names of their attributes."""
+        every = {"op": self.op, "pv": self.pv, "sp": self.sp, "stem": self.stem}
+        return {key: values for key, values in every.items() if values is not None}
+
+    def tags(self, key: str) -> tuple[str, ...]:
+        """Return the tags of the columns of a signal."""
+        return self.valves if key in ("op", "stem") else self.outputs
 
     @property
     def time(self) -> FloatArray:
@@ -273,16 +279,9 @@ class Record:
             inside = next((s for s in self.segments if s.first <= first < s.last), self.segments[0])
             start = inside.start + (first - inside.first) * self.sample_time
             gaps = tuple(Gap(g.row - first, g.start) for g in gaps if first < g.row < last)
-        return dataclasses.replace(
-            self,
-            op=self.op[rows],
-            pv=self.pv[rows],
-            sp=None if self.sp is None else self.sp[rows],
-            stem=None if self.stem is None else self.stem[rows],
-            start=start,
-            mask=None if self.mask is None else self.mask[rows],
-            gaps=gaps,
-        )
+        cut: dict[str, Any] = {key: values[rows] for key, values in self.signals.items()}
+        mask = None if self.mask is None else self.mask[rows]
+        return dataclasses.replace(self, start=start, mask=mask, gaps=gaps, **cut)
 
     def usable_rows(self, wanted: Iterable[Quality] = USABLE) -> list[tuple[int, int]]:
         """Return the longest stretches of samples of ``wanted`` qualities without a gap.
@@ -314,11 +313,9 @@ class Record:
         mask = np.full(int(rows[-1]) + 1, Quality.BAD, dtype=np.uint8)
         mask[rows] = self.quality
         spread: dict[str, Any] = {}
-        for key in ("op", "pv", "sp", "stem"):
-            values: FloatArray | None = getattr(self, key)
-            if values is not None:
-                spread[key] = np.full((len(mask), values.shape[1]), np.nan)
-                spread[key][rows] = values
+        for key, values in self.signals.items():
+            spread[key] = np.full((len(mask), values.shape[1]), np.nan)
+            spread[key][rows] = values
         return dataclasses.replace(self, mask=mask, gaps=(), **spread)
 
     def filled_rows(self) -> IndexArray:

@@ -5,7 +5,6 @@ import struct
 from collections.abc import Sequence
 from pathlib import Path
 
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.message_definitions import definition
 from stiction_ros.records.bag.writer import BagWriter
@@ -52,14 +51,8 @@ def write_bag(record: Record, directory: str | Path) -> dict[str, int]:
             where=record.name,
             fix="use times from 0 to 2 147 483 647 s",
         )
-    signals: list[tuple[str, Sequence[str], FloatArray]] = [
-        ("/pv", record.outputs, record.pv),
-        ("/op", record.valves, record.op),
-    ]
-    if record.sp is not None:
-        signals.insert(0, ("/sp", record.outputs, record.sp))
-    if record.stem is not None:
-        signals.append(("/stem", record.valves, record.stem))
+    order = [key for key in ("sp", "pv", "op", "stem") if key in record.signals]
+    signals = [(f"/{key}", record.tags(key), record.signals[key]) for key in order]
     text, type_hash = definition(JOINT_STATE)
     with BagWriter(directory) as writer:
         for topic, _, _ in signals:
