@@ -2,7 +2,6 @@
 
 import argparse
 import contextlib
-import csv
 import dataclasses
 import datetime
 import importlib.util
@@ -24,8 +23,7 @@ from stiction_ros.cli.shared.progress import bar
 from stiction_ros.cli.shared.searches import add_law, delay_range
 from stiction_ros.errors import InputError, foreign, storing
 from stiction_ros.intake.sheets.cells import Numbers
-from stiction_ros.intake.sheets.layout import delimiter_of
-from stiction_ros.intake.sheets.text import open_text
+from stiction_ros.intake.tables.tags import list_rows
 from stiction_ros.texts import probability, spoken
 
 if TYPE_CHECKING:
@@ -165,7 +163,7 @@ def run(options: argparse.Namespace) -> int:
             raise InputError("there is no such file or folder", where=str(path))
     reading = intake.intake_options(options)
     costs = _costs(options.cost)
-    units = {name: unit for _, name, unit in _pairs(options.units)}
+    units = {name: unit for _, name, unit in _told(options.units, "unit")}
     identification = IdentificationOptions(law=options.law)
     find_law(identification.first_law)  # an unknown one stops the survey, and not every loop of it
     if options.delay is not None:
@@ -269,31 +267,25 @@ def _write(found: Any, out: Path, earlier: Sequence[Any]) -> None:
             write_xlsx(out / XLSX, found.entries)
 
 
-def _pairs(file: str | None) -> list[tuple[int, str, str]]:
-    """Return row and first two cells of each row of a table, semicolons or commas between them."""
+def _told(file: str | None, what: str) -> list[tuple[str, str, str]]:
+    """Return place, loop and ``what`` is told of it, of each row of a list of loops."""
     if file is None:
         return []
-    with foreign(file), open_text(Path(file)) as source:
-        lines = source.read().splitlines()
-    read = enumerate(csv.reader(lines, delimiter=delimiter_of(lines)), start=1)
-    rows = [(number, row) for number, row in read if row and row[0].strip()]
-    short = next((number for number, row in rows if len(row) < 2), None)
-    if short is not None:
-        raise InputError("has no second column", where=f"{file}: row {short}", fix="loop,value")
-    pairs = [(number, row[0].strip(), row[1].strip()) for number, row in rows]
-    return pairs[1:] if pairs and pairs[0][1].lower() in ("loop", "tag", "name") else pairs
+    with foreign(file):
+        rows = list_rows(Path(file), {"loop", what}.issubset, f"name them loop,{what}")
+        return [(where, row["loop"], row[what]) for where, row in rows if row["loop"]]
 
 
 def _costs(file: str | None) -> dict[str, float]:
     """Return the cost of each loop; numbers are written as in exports, with point or comma."""
     found = {}
-    for row, name, text in _pairs(file):
+    for where, name, text in _told(file, "cost"):
         cells = Numbers(decimal_comma=True)
         cells.add([text])
         value = float(cells.values()[0])
         if not 0.0 <= value < float("inf"):
             said = f"{text!r} is no cost of loop {name}"
-            raise InputError(said, where=f"{file}: row {row}", fix="use a number of 0 or more")
+            raise InputError(said, where=where, fix="use a number of 0 or more")
         found[name] = value
     return found
 

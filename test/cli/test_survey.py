@@ -155,6 +155,6 @@ def test_costs_are_read_like_exports(tmp_path: Path) -> None:
     path = tmp_path / "cost.csv"
     path.write_text("loop;cost\nFIC1;3,5\nFIC2;2\n")
     assert _costs(str(path)) == {"FIC1": 3.5, "FIC2": 2.0}
-    path.write_text("FIC1,3.5\nFIC2,much\n")
-    with pytest.raises(InputError, match=r"row 2: 'much' is no cost of loop FIC2"):
+    path.write_text("loop,cost\nFIC1,3.5\nFIC2,much\n")
+    with pytest.raises(InputError, match=r"line 3: 'much' is no cost of loop FIC2"):
         _costs(str(path))

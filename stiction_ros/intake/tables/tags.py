@@ -1,7 +1,7 @@
 """A list that says which tags make up which loop, and how single files are read."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,27 +42,30 @@ class TagRow:
         return bool(wanted) and _parts(str(path.absolute()))[-len(wanted) :] == wanted
 
 
-def read_rows(path: Path) -> list[TagRow]:
-    """Read the rows of a tag list; what says nothing known in it is an :class:`InputError`."""
+def list_rows(
+    path: Path, known: Callable[[set[str]], bool], fix: str
+) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield the place of each row of a list, and its cells by the names of their columns.
+
+    Raises:
+        InputError: its columns are not those that are ``known``; ``fix`` says what helps.
+    """
     sheet = open_sheets(path)[0]
     header = [name.casefold() for name in sheet.layout.header]
-    loop = not {"loop", "name"}.isdisjoint(header)
-    known = loop and ({"pv", "op"} <= set(header) or {"tag", "signal"} <= set(header))
-    if not known and "file" not in header:
-        raise InputError(
-            f"has the columns {', '.join(sheet.layout.given)}",
-            fix="a tag list has the columns loop,pv,sp,op,mode with a row a loop, or "
-            "tag,loop,signal",
-        )
+    if not known(set(header)):
+        raise InputError(f"has the columns {', '.join(sheet.layout.given)}", fix=fix)
     # A list is text: what looks like the first row of numbers is not where it begins.
     sheet.header_once = True
     sheet.layout = dataclasses.replace(sheet.layout, first=sheet.layout.place + 1)
-    found = []
     for columns, lines in sheet.pieces():
         for line, *cells in zip(lines.tolist(), *map(as_text, columns), strict=True):
             row = dict(zip(header, map(str.strip, cells), strict=True))
-            found.append(_row(row, f"{path}: {sheet.row_word} {line}"))
-    return found
+            yield f"{path}: {sheet.row_word} {line}", row
+
+
+def _is_tag_list(header: set[str]) -> bool:
+    loop = not {"loop", "name"}.isdisjoint(header)
+    return "file" in header or (loop and ({"pv", "op"} <= header or {"tag", "signal"} <= header))
 
 
 def _row(cells: Mapping[str, str], where: str) -> TagRow:
@@ -197,8 +200,9 @@ def read_tag_list(path: Path) -> TagList:
     A column ``op_unit`` may say ``percent``, ``share`` or ``ma``. A row with a ``file`` counts
     for that file alone, and may have ``time``, ``dates``, ``time_unit`` and ``sample_time``.
     """
+    fix = "a tag list has the columns loop,pv,sp,op,mode with a row a loop, or tag,loop,signal"
     with foreign(path):
-        rows = read_rows(path)
+        rows = [_row(cells, where) for where, cells in list_rows(path, _is_tag_list, fix)]
     general = [row for row in rows if not row.file]
     units = {row.loop: row.unit for row in general if row.unit is not None}
     return TagList(_by_tag(general), units, [row for row in rows if row.file])
