@@ -7,7 +7,7 @@ The first entry is the stem; Kano's law and XCH's carry the direction of motion 
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,14 +16,11 @@ from stiction_ros.compiled import compiled
 from stiction_ros.effects import HeStiction, KanoStiction, SemiPhysicalStiction, XchStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.friction.he_smoothed import smoothed_step
-from stiction_ros.effects.friction.kano_smoothed import REST, kano_step
+from stiction_ros.effects.friction.kano_smoothed import kano_step
 from stiction_ros.errors import InputError
 
 OVERSHOOT = 1.99  # K of the semi-physical law, as published
 SMOOTHING = 1e4
-
-Simulated = Callable[[FloatArray, float, float, float], FloatArray]
-Step = Callable[[Sequence[Any], tuple[Any, Any], tuple[Any, Any], Any, Any], list[Any]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,9 +29,26 @@ class SmoothLaw:
 
     name: str  # of the hard law
     kind: Any  # its class
-    states: int  # entries of the state of the smoothed law
-    simulated: Simulated  # stem, (N,), %, of OP (N,), f_S, f_D, % and τ, 1/%; from rest at OP
-    step: Step  # state, (u_k, u_{k−1}), (f_S, f_D), τ and tanh → next state; numbers or CasADi
+    states: int = 1  # entries of the state of the smoothed law: two are those of Kano's
+    overshoot: float = 1.0  # K, by which a slip of a law with one state exceeds He's
+
+    def step(
+        self, state: Sequence[Any], op: tuple[Any, Any], figures: tuple[Any, Any, Any], tanh: Any
+    ) -> list[Any]:
+        """Return the next state; all may be numbers or CasADi expressions.
+
+        Args:
+            state: its entries.
+            op: u_k and u_{k−1}, %.
+            figures: f_S, f_D, % and τ, 1/%.
+            tanh: of numbers or expressions.
+        """
+        if self.states > 1:
+            return list(kano_step((state[0], op[1], state[1]), op[0], figures, tanh))
+        follows = smoothed_step(state[0], op[0], figures[:2], figures[2], tanh)
+        if self.overshoot == 1.0:
+            return [follows]
+        return [state[0] + self.overshoot * (follows - state[0])]
 
     def stems(self, op: FloatArray, friction: FloatArray, smoothing: FloatArray) -> FloatArray:
         """Return smoothed stems, shape (m, N), %, of OP, shape (N, m), %.
@@ -45,7 +59,8 @@ class SmoothLaw:
         for j, (static, dynamic) in enumerate(friction.tolist()):
             dynamic = max(dynamic, 0.0)
             column, tau = np.ascontiguousarray(op[:, j]), float(smoothing[j])
-            made[j] = self.simulated(column, max(static, dynamic), dynamic, tau)
+            figures = max(static, dynamic), dynamic, tau
+            made[j] = _simulated(column, figures, self.states > 1, self.overshoot)
         return made
 
     def hard_stems(self, op: FloatArray, friction: FloatArray) -> FloatArray:
@@ -77,79 +92,32 @@ def final_smoothing(limits: FloatArray) -> FloatArray:
     return np.maximum(SMOOTHING, 10.0 * SMOOTHING / np.maximum(limits, 1e-9))
 
 
-@compiled
-def _he(op: FloatArray, static: float, dynamic: float, smoothing: float) -> FloatArray:
-    stems = np.empty(len(op))
-    stem = op[0]
-    for k in range(len(op)):
-        error = op[k] - stem
-        above = math.tanh(smoothing * (error + static))
-        below = math.tanh(smoothing * (static - error))
-        stays = 0.5 * above + 0.5 * below
-        stem = stays * stem + (1.0 - stays) * op[k] + (0.5 * below - 0.5 * above) * dynamic
-        stems[k] = stem
-    return stems
+_he_step, _kano_step = compiled(smoothed_step), compiled(kano_step)
 
 
 @compiled
-def _semi_physical(op: FloatArray, static: float, dynamic: float, smoothing: float) -> FloatArray:
-    stems = np.empty(len(op))
-    stem = op[0]
+def _simulated(
+    op: FloatArray, figures: tuple[float, float, float], moving: bool, overshoot: float
+) -> FloatArray:
+    """Return the stem, shape (N,), %, from rest at OP; ``moving`` for Kano's state."""
+    stems, stem, last, direction = np.empty(len(op)), op[0], op[0], 0.0
     for k in range(len(op)):
-        error = op[k] - stem
-        above = math.tanh(smoothing * (error + static))
-        below = math.tanh(smoothing * (static - error))
-        slips = 1.0 - 0.5 * above - 0.5 * below
-        stem = stem + OVERSHOOT * (slips * error + (0.5 * below - 0.5 * above) * dynamic)
+        if moving:
+            stem, direction = _kano_step((stem, last, direction), op[k], figures, math.tanh)
+            last = op[k]
+        else:
+            follows = _he_step(stem, op[k], figures[:2], figures[2], math.tanh)
+            stem = follows if overshoot == 1.0 else stem + overshoot * (follows - stem)
         stems[k] = stem
     return stems
-
-
-@compiled
-def _kano(op: FloatArray, static: float, dynamic: float, smoothing: float) -> FloatArray:
-    stems = np.empty(len(op))
-    stem, last, direction = op[0], op[0], 0.0
-    for k in range(len(op)):
-        move, error = smoothing * (op[k] - last), op[k] - stem
-        onwards = 0.5 + 0.5 * math.tanh(smoothing * (direction - 0.5))
-        backwards = 0.5 + 0.5 * math.tanh(smoothing * (-direction - 0.5))
-        up = onwards * (0.5 + 0.5 * math.tanh(move - REST))
-        down = backwards * (0.5 + 0.5 * math.tanh(-move - REST))
-        stopped = 1.0 - up - down
-        up += stopped * (0.5 + 0.5 * math.tanh(smoothing * (error - static)))
-        down += stopped * (0.5 + 0.5 * math.tanh(smoothing * (-error - static)))
-        stem = (1.0 - up - down) * stem + up * (op[k] - dynamic) + down * (op[k] + dynamic)
-        direction, last = up - down, op[k]
-        stems[k] = stem
-    return stems
-
-
-def _he_step(
-    state: Sequence[Any], op: tuple[Any, Any], frictions: tuple[Any, Any], smoothing: Any, tanh: Any
-) -> list[Any]:
-    return [smoothed_step(state[0], op[0], frictions, smoothing, tanh)]
-
-
-def _semi_physical_step(
-    state: Sequence[Any], op: tuple[Any, Any], frictions: tuple[Any, Any], smoothing: Any, tanh: Any
-) -> list[Any]:
-    stem = state[0]
-    return [stem + OVERSHOOT * (smoothed_step(stem, op[0], frictions, smoothing, tanh) - stem)]
-
-
-def _kano_step(
-    state: Sequence[Any], op: tuple[Any, Any], frictions: tuple[Any, Any], smoothing: Any, tanh: Any
-) -> list[Any]:
-    memory = state[0], op[1], state[1]
-    return list(kano_step(memory, op[0], (*frictions, smoothing), tanh))
 
 
 SMOOTH_LAWS: Mapping[str, SmoothLaw] = {
     law.name: law
     for law in (
-        SmoothLaw("he", HeStiction, 1, _he, _he_step),
-        SmoothLaw("kano", KanoStiction, 2, _kano, _kano_step),
-        SmoothLaw("xch", XchStiction, 2, _kano, _kano_step),
-        SmoothLaw("semi_physical", SemiPhysicalStiction, 1, _semi_physical, _semi_physical_step),
+        SmoothLaw("he", HeStiction),
+        SmoothLaw("kano", KanoStiction, states=2),
+        SmoothLaw("xch", XchStiction, states=2),
+        SmoothLaw("semi_physical", SemiPhysicalStiction, overshoot=OVERSHOOT),
     )
 }

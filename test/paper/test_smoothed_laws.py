@@ -32,7 +32,7 @@ def test_a_step_is_the_simulated_law(name: str) -> None:
     op = loops.example1(3, samples=60).op
     state, made = [op[0, 0], *[0.0] * (law.states - 1)], []
     for value, last in zip(op[:, 0], np.append(op[0, 0], op[:-1, 0]), strict=True):
-        state = law.step(state, (value, last), tuple(FRICTION[0]), 7.0, np.tanh)
+        state = law.step(state, (value, last), (*FRICTION[0], 7.0), np.tanh)
         made.append(state[0])
     assert made == pytest.approx(law.stems(op, FRICTION, np.array([7.0]))[0], abs=1e-9)
 

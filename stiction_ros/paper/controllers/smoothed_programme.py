@@ -94,11 +94,9 @@ class SmoothedProgramme:
             unknowns += [op, stuck, turn, after]
             moved = casadi.SX(op)
             for row, j in enumerate(sticky):
-                figures = friction[row, 0], friction[row, 1]
+                figures = friction[row, 0], friction[row, 1], self.tuning.smoothing
                 law, memory = self._laws[row], [stem[j], ways[row]]
-                follows, *way = law.step(
-                    memory, (op[j], last[j]), figures, self.tuning.smoothing, casadi.tanh
-                )
+                follows, *way = law.step(memory, (op[j], last[j]), figures, casadi.tanh)
                 residuals.append(follows - stuck[row])
                 moved[j] = stuck[row]
                 if row in self._directed:

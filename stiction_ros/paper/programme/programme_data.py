@@ -26,7 +26,7 @@ def _step(law: SmoothLaw, order: int) -> Any:
     friction = symbols("f", 2)
     following: Any = ca.vertcat(
         *law.step(
-            ca.vertsplit(start), (op[0], op[1]), (friction[0], friction[1]), smoothing, ca.tanh
+            ca.vertsplit(start), (op[0], op[1]), (friction[0], friction[1], smoothing), ca.tanh
         )
     )
     inputs = ca.vertcat(start, friction)
