@@ -108,7 +108,7 @@ class FrictionProgramme:
         valves = self.frame.valves
         friction, smoothing = ca.MX.sym("f", valves, 2), ca.MX.sym("tau", valves)
         rows = [
-            self.data.stems.expression(0, u, ca.vertcat(friction[j, :].T, smoothing[j]))[0]
+            self.data.stems[0](u, friction[j, :].T, smoothing[j]).T
             for j, u in enumerate(self.data.op)
         ]
         return ca.Function("stems", [friction, smoothing], [ca.vertcat(*rows)])
@@ -164,15 +164,13 @@ class FrictionProgramme:
     def _stem(self, j: int, x: Any, about: Any, smoothing: Any, order: int) -> Any:
         """Return χ of valve j, shape (1, N), as its Taylor polynomial in f_S and f_D."""
         own = slice(2 * j, 2 * j + 2)
-        figures = ca.vertcat(about[own], smoothing[j])
-        stem, *rows = self.data.stems.expression(order, self.data.op[j], figures)
-        static, dynamic = ca.vertsplit(x[own] - about[own])
-        for row, step in zip(rows[:2], (static, dynamic), strict=False):
-            stem = stem + step * row
-        squares = (0.5 * static**2, static * dynamic, 0.5 * dynamic**2)
-        for row, step in zip(rows[2:], squares, strict=False):
-            stem = stem + step * row
-        return stem
+        step, op = x[own] - about[own], self.data.op[j]
+        stem, *derived = self.data.stems[order].call([op, about[own], smoothing[j]])
+        for power, term in enumerate(derived, start=1):
+            for k in range(power):
+                term = ca.reshape(ca.mtimes(term, step) / (k + 1), len(op), -1)
+            stem = stem + term
+        return stem.T
 
     def _residual(self, i: int, x: Any, stems: list[Any]) -> Any:
         """Return the error of the prediction (12c) of output i, shape (1, N − ε)."""
