@@ -14,7 +14,6 @@ CAPPED = "Maximum_Iterations_Exceeded"
 class SolvedStart:
     """One run of IPOPT from one start with one choice of delays."""
 
-    kind: str  # ``border``, ``ellipse``, ``inside``, ``restart`` or ``delay``
     delays: Delays  # for each output the t_d of each valve, samples
     start: tuple[tuple[float, float], ...]  # (f_S, f_D) per valve where it began, %
     end: tuple[tuple[float, float], ...]  # (f_S, f_D) per valve where it ended, %

@@ -27,8 +27,6 @@ from stiction_ros.paper.programme.reduced_programme import (
     StemTable,
 )
 from stiction_ros.paper.programme.starts import (
-    Start,
-    StartKind,
     apparent_stictions,
     around,
     candidates,
@@ -90,7 +88,7 @@ class _Search:
         for delays in self.choices:
             for _ in range(each):
                 self._open(delays)
-        onward: Iterator[tuple[Start, Delays, float]] = iter(())
+        onward: Iterator[tuple[FloatArray, Delays, float]] = iter(())
         begun_from: SolvedStart | None = None
         while len(self.log) < self.budget:
             best = best_of(self.log)
@@ -107,20 +105,20 @@ class _Search:
         self.progress(1.0)
         return best_of(self.log)
 
-    def _rank(self) -> dict[Delays, list[Start]]:
+    def _rank(self) -> dict[Delays, list[FloatArray]]:
         """Return all candidates, the best first, for each choice of delays."""
         stictions = np.minimum(apparent_stictions(self.record), self.table.limits)
         points = candidates(self.table.limits, stictions, POINTS)
         ranked = {}
         for delays, programme in self.programmes.items():
-            values = [programme.criterion(point.friction)[0] for point in points]
+            values = [programme.criterion(point)[0] for point in points]
             ranked[delays] = [points[k] for k in np.argsort(values, kind="stable")]
         return ranked
 
     def _open(self, delays: Delays) -> None:
         """Solve from the best candidate that is not near a place tried before."""
         for start in self._ranked[delays]:
-            if not self._near(start.friction, self._tried[delays]):
+            if not self._near(start, self._tried[delays]):
                 self._solve(start, delays, WIDTH)
                 return
         self._solve(self._ranked[delays][0], delays, NARROW)
@@ -129,52 +127,50 @@ class _Search:
         reach = APART * self.table.limits
         return any((np.abs(place - friction).max(axis=1) < reach).all() for place in places)
 
-    def _onward(self, best: SolvedStart) -> Iterator[tuple[Start, Delays, float]]:
+    def _onward(self, best: SolvedStart) -> Iterator[tuple[FloatArray, Delays, float]]:
         """Yield ways to go on from an end: nearer, a valve released, farther, other delays."""
         friction, criterion = np.array(best.end), self.programmes[best.delays].criterion
         for reach in (AROUND, NEARER * AROUND):
             near = [friction, *around(friction, self.table.limits, reach, POINTS_AROUND)]
             first = min(near, key=lambda point: criterion(point)[0])
-            yield Start(StartKind.RESTART, first), best.delays, NARROW
+            yield first, best.delays, NARROW
         for j in range(len(friction)):
             if friction[j].max() > 0.0 and len(friction) > 1:
                 released = friction.copy()
                 released[j] = 0.0
-                yield Start(StartKind.RESTART, released), best.delays, NARROW
-        yield Start(StartKind.RESTART, friction), best.delays, 4.0 * WIDTH
+                yield released, best.delays, NARROW
+        yield friction, best.delays, 4.0 * WIDTH
         value = {delays: self.programmes[delays].criterion(friction)[0] for delays in self.choices}
         for delays in sorted(self.choices, key=lambda delays: value[delays]):
             if delays != best.delays:
-                yield Start(StartKind.DELAY, friction), delays, NARROW
+                yield friction, delays, NARROW
 
-    def _solve(self, start: Start, delays: Delays, width: float) -> None:
+    def _solve(self, start: FloatArray, delays: Delays, width: float) -> None:
         start = self._released(start, self.programmes[delays].criterion)
-        solution = self.programmes[delays].solve(start.friction, width)
+        solution = self.programmes[delays].solve(start, width)
         fits = one_step.evaluated(self.record, self.options, solution.friction, delays).fits
         stable = max(fit.largest_root for fit in fits) < 1.0
-        self._tried[delays] += [start.friction, solution.friction]
+        self._tried[delays] += [start, solution.friction]
         self.log.append(solved(start, delays, solution, stable))
         self.progress(min(1.0, len(self.log) / self.budget))
 
-    def _released(self, start: Start, criterion: Criterion) -> Start:
+    def _released(self, friction: FloatArray, criterion: Criterion) -> FloatArray:
         """Return the start, or the same with valves released as long as that lowers (12a)."""
-        friction = start.friction
         for j in range(len(friction) if len(friction) > 1 else 0):
             released = friction.copy()
             released[j] = 0.0
             if criterion(released)[0] < criterion(friction)[0]:
                 friction = released
-        return Start(start.kind, friction)
+        return friction
 
 
-def solved(start: Start, delays: Delays, end: Solution, stable: bool) -> SolvedStart:
+def solved(start: FloatArray, delays: Delays, end: Solution, stable: bool) -> SolvedStart:
     """Return what one run of IPOPT came to, in plain numbers."""
     begun, ended = (
         tuple((float(static), float(dynamic)) for static, dynamic in friction)
-        for friction in (start.friction, end.friction)
+        for friction in (start, end.friction)
     )
     return SolvedStart(
-        kind=start.kind.value,
         delays=delays,
         start=begun,
         end=ended,
@@ -209,7 +205,7 @@ def search_as_printed(
     for delays in choices:
         programme = FrictionProgramme(data, delays)
         for start in starts:
-            end = programme.solve(programme.start(start.friction), smoothing)
+            end = programme.solve(programme.start(start), smoothing)
             log.append(solved(start, delays, end, bool(end.stable)))
             progress(len(log) / (len(choices) * len(starts)))
     accepted = best_of(log)

@@ -12,7 +12,6 @@ where qᵀ K q = 4AC − B²; the one with positive 4AC − B² is the ellipse.
 """
 
 import dataclasses
-import enum
 import itertools
 
 import numpy as np
@@ -108,24 +107,6 @@ def _of_valve(record: Record, valve: int) -> float:
     return 0.0
 
 
-class StartKind(enum.StrEnum):
-    """Where a start comes from."""
-
-    BORDER = "border"
-    ELLIPSE = "ellipse"
-    INSIDE = "inside"
-    RESTART = "restart"
-    DELAY = "delay"
-
-
-@dataclasses.dataclass(frozen=True)
-class Start:
-    """A first guess of the frictions."""
-
-    kind: StartKind  # where it comes from
-    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
-
-
 def border(limit: float) -> FloatArray:
     """Return the border of 0 ≤ f_D ≤ f_S ≤ limit in steps, shape (n, 2), %.
 
@@ -174,8 +155,8 @@ def around(friction: FloatArray, limits: FloatArray, reach: float, count: int) -
     return found
 
 
-def draw_starts(limits: FloatArray, stictions: FloatArray, count: int) -> tuple[Start, ...]:
-    """Return M starts for all valves at once, as printed.
+def draw_starts(limits: FloatArray, stictions: FloatArray, count: int) -> tuple[FloatArray, ...]:
+    """Return M starts for all valves at once as printed: rows (f_S, f_D), shape (m, 2) each, %.
 
     Up to three (and no more than half) lie on the line of S_0, the others evenly on the
     border. With several valves, valve j takes the list moved on by j, so that the valves do
@@ -183,33 +164,30 @@ def draw_starts(limits: FloatArray, stictions: FloatArray, count: int) -> tuple[
     on the border only.
     """
     on_line = min(MAX_LINE, count // 2)
-    rows, kinds = [], []
+    rows = []
     for j, (limit, stiction) in enumerate(zip(limits.tolist(), stictions.tolist(), strict=True)):
         lined = on_line if stiction > 0.0 else 0
         edge = border(limit)
         chosen = edge[(np.arange(count - lined) * len(edge)) // max(count - lined, 1)]
         points = np.vstack([stiction_line(stiction, limit, lined), chosen])
-        named = [StartKind.ELLIPSE] * lined + [StartKind.BORDER] * (count - lined)
         rows.append(np.roll(points, -j, axis=0))
-        kinds.append(named[j % count :] + named[: j % count])
-    return tuple(Start(kinds[0][k], np.array([part[k] for part in rows])) for k in range(count))
+    return tuple(np.stack(rows, axis=1))
 
 
-def candidates(limits: FloatArray, stictions: FloatArray, count: int) -> tuple[Start, ...]:
+def candidates(limits: FloatArray, stictions: FloatArray, count: int) -> tuple[FloatArray, ...]:
     """Return points to choose starts from: one valve has friction, the others have none.
 
     S_0, %, is 0 without an ellipse; ``count`` points lie inside the widest triangle, as many
-    for their area in the others.
+    for their area in the others. Each has rows (f_S, f_D), shape (m, 2), %.
     """
-    found = [Start(StartKind.BORDER, np.zeros((len(limits), 2)))]
+    found = [np.zeros((len(limits), 2))]
     for j, (limit, stiction) in enumerate(zip(limits.tolist(), stictions.tolist(), strict=True)):
         share = max(1, round(count * (limit / float(limits.max())) ** 2))
-        parts = [(StartKind.BORDER, border(limit)[1:]), (StartKind.INSIDE, inside(limit, share))]
+        parts = [border(limit)[1:], inside(limit, share)]
         if stiction > 0.0:
-            parts.append((StartKind.ELLIPSE, stiction_line(stiction, limit, LINE_POINTS)))
-        for kind, points in parts:
-            for point in points:
-                friction = np.zeros((len(limits), 2))
-                friction[j] = point
-                found.append(Start(kind, friction))
+            parts.append(stiction_line(stiction, limit, LINE_POINTS))
+        for point in np.vstack(parts):
+            friction = np.zeros((len(limits), 2))
+            friction[j] = point
+            found.append(friction)
     return tuple(found)
