@@ -82,4 +82,4 @@ def search(
     found, friction, delays = best
     stable = all(fit.largest_root < 1.0 for fit in found.fits)
     reason = "" if stable else "the process at the best point is unstable"
-    return one_step.Answer(reason, friction, delays, found.squared_error, total, found)
+    return one_step.Answer(reason, friction, delays, found.squared_error, total)

@@ -98,9 +98,8 @@ class Answer:
     reason: str  # why the answer is not to be trusted; empty when it is
     friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
     delays: Delays  # t_d per output and valve, samples
-    objective: float | None  # (12a) as the method has it; None for that of the hard law
+    objective: float | None  # (12a) as the method has it; None where it came to nothing
     points: int  # frictions at which it was evaluated
-    found: "EquationError | None" = None  # models and stems; None for those of the hard law
     starts: tuple[SolvedStart, ...] = ()  # every run of a solver
 
 
@@ -178,8 +177,7 @@ def result(
 ) -> PaperIdentification:
     """Return the result of a one-step method in the form of all methods."""
     limits, orders = friction_limits(record, options), orders_of(record, options)
-    hard = evaluated(record, options, np.maximum(answer.friction, 0.0), answer.delays)
-    found = answer.found or hard
+    found = evaluated(record, options, np.maximum(answer.friction, 0.0), answer.delays)
     stem = found.stems.T.copy()
     stem.flags.writeable = False
     outputs = tuple(
@@ -192,8 +190,8 @@ def result(
         notes.append(f"orders were not given: n_a = {DEFAULT_ORDER} was taken")
     low, high = options.delay
     log = SearchLog(
-        squared_error=hard.squared_error,
-        objective=hard.squared_error if answer.objective is None else answer.objective,
+        squared_error=found.squared_error,
+        objective=found.squared_error if answer.objective is None else answer.objective,
         output_order=orders.output,
         input_order=orders.input,
         first=orders.first,
