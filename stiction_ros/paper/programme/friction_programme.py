@@ -46,7 +46,6 @@ class FrictionProgramme:
 
     def __init__(self, data: ProgrammeData, delays: Delays) -> None:
         self.data, self.delays, self.frame = data, delays, Frame.of(data, delays)
-        self._stems = self._build_stems()
         self._solver = self._build_solver()
 
     def start(self, friction: FloatArray) -> FloatArray:
@@ -61,7 +60,7 @@ class FrictionProgramme:
         The frictions are rows (f_S, f_D), shape (m, 2), %; τ is one a valve, 1/%.
         """
         span, data = self.data.op_span, self.data
-        stems = np.array(self._stems(friction / span[:, None], smoothing * span))
+        stems = data.law.stems(data.op.T, friction / span[:, None], smoothing * span)
         x, total = self.start(friction), 0.0
         for i, (y, row) in enumerate(zip(data.pv, self.delays, strict=True)):
             kept = data.orders.kept(i, self.frame.valves)
@@ -103,15 +102,6 @@ class FrictionProgramme:
             feasible=finite and bool(slack.min(initial=0.0) >= -FEASIBILITY),
             stable=finite and max(fit.largest_root for fit in self.frame.models(end)) < 1.0,
         )
-
-    def _build_stems(self) -> Any:
-        valves = self.frame.valves
-        friction, smoothing = ca.MX.sym("f", valves, 2), ca.MX.sym("tau", valves)
-        rows = [
-            self.data.stems[0](u, friction[j, :].T, smoothing[j]).T
-            for j, u in enumerate(self.data.op)
-        ]
-        return ca.Function("stems", [friction, smoothing], [ca.vertcat(*rows)])
 
     def _build_solver(self) -> Any:
         """Return the solver; derivatives are those of stems expanded about the frictions of x."""

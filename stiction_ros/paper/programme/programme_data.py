@@ -46,6 +46,7 @@ class ProgrammeData:
     pv_mean: FloatArray  # shape (p,)
     limit: FloatArray  # f_max = Δu of every valve, shape (m,), %
     orders: ArxOrders  # n_a, n_b, ε
+    law: SmoothLaw  # of the valves
     stems: tuple[Any, ...]  # functions of N samples, by the order of derivatives they go to
 
     @classmethod
@@ -55,8 +56,9 @@ class ProgrammeData:
         """Scale OP, shape (N, m), and centre PV, shape (N, p)."""
         mean, span, level = op.mean(axis=0), np.ptp(op, axis=0), pv.mean(axis=0)
         scaled, centred = ((op - mean) / span).T.copy(), (pv - level).T.copy()
-        stems = stem_functions(len(op), smooth_law(law))
-        return cls(scaled, centred, mean, span, level, limit, orders, stems)
+        taken = smooth_law(law)
+        stems = stem_functions(len(op), taken)
+        return cls(scaled, centred, mean, span, level, limit, orders, taken, stems)
 
 
 @dataclasses.dataclass(frozen=True)
