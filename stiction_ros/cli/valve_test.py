@@ -14,7 +14,6 @@ from stiction_ros.records.parts import longest_part
 from stiction_ros.texts import spoken
 
 if TYPE_CHECKING:
-    from stiction_ros.identification.valve_test.facts import Limits
     from stiction_ros.identification.valve_test.judgement import Judgement
     from stiction_ros.identification.valve_test.plan import Facts, Plan
     from stiction_ros.records.record import Record
@@ -43,51 +42,51 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    from stiction_ros.identification.valve_test.plan import first_round, further_round
+
     limits = _limits(options)
     loop = intake.opened(options)
     intake.tell(loop)
     if options.what == "plan":
-        from stiction_ros.identification.valve_test.plan import first_round
-
-        facts = _before(longest_part(loop.parts), limits)
-        plan = first_round(facts)
+        plan = first_round(_before(longest_part(loop.parts)).within(*limits))
         hand_over(options.json, plan.to_dict(), lambda: _show(plan, str(options.record)))
         _write(plan, options.out)
         return 0
-    from stiction_ros.identification.valve_test.answer import answer
+    from stiction_ros.identification.valve_test.facts import facts_of_test, judged_record
 
-    before: Facts | None = None
+    facts, record = None, max(loop.parts, key=len)
     if options.before is not None:
         given = argparse.Namespace(**(vars(options) | {"record": options.before}))
-        before = _before(longest_part(intake.opened(given).parts), limits)
-    record = max(loop.parts, key=len)
+        facts = _before(longest_part(intake.opened(given).parts))
     with bar("judging"):
-        said = answer(record, before, limits)
-    hand_over(options.json, said.to_dict(), lambda: _told(said.judgement, said.plan, options))
-    _write(said.plan, options.out, said.judgement.trial.steps.levels[1:].tolist())
+        said = judged_record(record, None if facts is None else facts.gain)
+        facts = (facts or facts_of_test(record, said)).within(*limits)
+        further = None if said.decided else further_round(facts, said)
+    told = {"next": None if further is None else further.to_dict(), "sentence": said.sentence}
+    hand_over(options.json, said.to_dict() | told, lambda: _told(said, further, options))
+    _write(further, options.out, said.trial.steps.levels[1:].tolist())
     return 0
 
 
-def _limits(options: argparse.Namespace) -> "Limits":
-    from stiction_ros.identification.valve_test.facts import Limits
-
+def _limits(options: argparse.Namespace) -> tuple[float | None, float | None]:
+    """Return how far OP, %, and PV may go; None where that is not said."""
     for name in ("op_limit", "pv_limit"):
         value = getattr(options, name)
         if value is not None and not 0.0 < value < 1e300:
             raise InputError(
                 f"{value:g} is no distance", where=f"--{name.replace('_', '-')}", fix="use above 0"
             )
-    return Limits(options.op_limit, options.pv_limit)
+    return options.op_limit, options.pv_limit
 
 
-def _before(record: "Record", limits: "Limits") -> "Facts":
+def _before(record: "Record") -> "Facts":
     """Return what a record of the loop as it runs tells."""
     from stiction_ros.identification import identify
     from stiction_ros.identification.valve_test.facts import facts_before
 
     with bar("identifying") as show:
         found = identify(record, None, show)
-    return facts_before(record, found, limits)
+    return facts_before(record, found)
 
 
 def _write(plan: "Plan | None", target: str | None, made: Sequence[float] = ()) -> None:

@@ -11,7 +11,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.gain.gain import gain_of
 from stiction_ros.identification import Identification, identify
-from stiction_ros.identification.valve_test.facts import Limits, facts_before
+from stiction_ros.identification.valve_test.facts import facts_before
 from stiction_ros.identification.valve_test.plan import first_round
 from stiction_ros.intake.loop import Loop
 from stiction_ros.records.csv_writer import DEFAULT_OUTPUT, DEFAULT_VALVE
@@ -93,7 +93,7 @@ def _assessed(loop: Loop, entry: Entry, options: SurveyOptions) -> Assessed:
     cycles = f", cycles by: {cause_words(entry.cause)}" if entry.cause else ""
     log = [*entry.notes, f"verdict: {entry.verdict}{cycles}"]
     if entry.verdict == "undecided" and len(record.valves) == len(record.outputs) == 1:
-        plan = first_round(facts_before(record, found, Limits()))
+        plan = first_round(facts_before(record, found))
         test = {"duration": plan.duration, "pv_move": plan.pv_move}
         entry = dataclasses.replace(entry, test=test)
     gain, doubt = None, ""

@@ -20,23 +20,7 @@ LAGS = 1.8
 """Lags of a hold: PV then shows five sixths of its answer, the model tells the rest."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Limits:
-    """How far a test may go from where it begins; None where that is not said."""
-
-    op: float | None = None  # %
-    pv: float | None = None  # engineering units
-
-    def of(self, facts: Facts) -> Facts:
-        """Return facts with these limits in place of theirs."""
-        op = facts.op_limit if self.op is None else self.op
-        reach = facts.pv_limit
-        if self.pv is not None:
-            reach = facts.pv - self.pv, facts.pv + self.pv
-        return dataclasses.replace(facts, op_limit=op, pv_limit=reach)
-
-
-def facts_before(record: Record, found: Identification, limits: Limits) -> Facts:
+def facts_before(record: Record, found: Identification) -> Facts:
     """Return what a routine record of a loop tells.
 
     OP may go by twice the largest f_S that the record does not reject, PV as far as that moves it
@@ -45,7 +29,6 @@ def facts_before(record: Record, found: Identification, limits: Limits) -> Facts
     Args:
         record: of one valve and one output.
         found: what identification made of it.
-        limits: of the test.
 
     Raises:
         InputError: several valves or outputs.
@@ -61,8 +44,7 @@ def facts_before(record: Record, found: Identification, limits: Limits) -> Facts
     pv = float(shown[-round(facts.hold / step) :].mean())
     reach = max(2.0 * valve.static_interval[1], WIDENS**2 * SMALLEST)
     room = float(np.abs(shown - pv).max()) + reach * abs(facts.gain or 0.0)
-    facts = dataclasses.replace(facts, pv=pv, op_limit=reach, pv_limit=(pv - room, pv + room))
-    return limits.of(facts)
+    return dataclasses.replace(facts, pv=pv).within(reach, room)
 
 
 def facts_of_answer(
@@ -114,7 +96,7 @@ def noise_over(left: FloatArray, count: int) -> float:
     return float(np.sqrt(0.5 * np.mean((means[count:] - means[:-count]) ** 2)))
 
 
-def facts_of_test(record: Record, judgement: Judgement, limits: Limits) -> Facts:
+def facts_of_test(record: Record, judgement: Judgement) -> Facts:
     """Return what a test tells where nothing was known before it.
 
     OP and PV may go by :data:`WIDENS` squared times as far as they went.
@@ -122,7 +104,7 @@ def facts_of_test(record: Record, judgement: Judgement, limits: Limits) -> Facts
     trial = judgement.trial
     levels, pv = trial.steps.levels, float(trial.pv[: int(trial.steps.rows[0])].mean())
     room = WIDENS**2 * float(np.abs(trial.pv - pv).max())
-    facts = Facts(
+    return Facts(
         valve=record.valves[0],
         op=float(levels[0]),
         pv=pv,
@@ -133,7 +115,6 @@ def facts_of_test(record: Record, judgement: Judgement, limits: Limits) -> Facts
         op_limit=WIDENS**2 * trial.steps.reach,
         pv_limit=(pv - room, pv + room),
     )
-    return limits.of(facts)
 
 
 def judged_record(record: Record, gain: float | None = None) -> Judgement:

@@ -45,6 +45,12 @@ class Facts:
         low, high = self.pv_limit
         return min(most, max(min(high - self.pv, self.pv - low), 0.0) / abs(self.gain))
 
+    def within(self, op: float | None, pv: float | None) -> "Facts":
+        """Return the same where OP, %, and PV may go this far from their start; None as before."""
+        op_limit = self.op_limit if op is None else op
+        pv_limit = self.pv_limit if pv is None else (self.pv - pv, self.pv + pv)
+        return dataclasses.replace(self, op_limit=op_limit, pv_limit=pv_limit)
+
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
@@ -105,7 +111,7 @@ def further_round(facts: Facts, judgement: Judgement, pairs: int = PAIRS) -> Pla
 
     The round keeps PV within its limits with probability :data:`DECIDED`, by all that the test
     leaves possible; of rounds that tell as much it is the smallest. Where friction is sure to be
-    there, it is to tell its size.
+    there, it is to tell its size. It begins where the test began.
 
     Args:
         facts: of the loop.
@@ -115,7 +121,9 @@ def further_round(facts: Facts, judgement: Judgement, pairs: int = PAIRS) -> Pla
     Returns:
         None where the limits leave no such round.
     """
-    reach, most = judgement.trial.steps.reach, min(facts.op_limit, LARGEST)
+    steps = judgement.trial.steps
+    reach, most = steps.reach, min(facts.op_limit, LARGEST)
+    facts = dataclasses.replace(facts, op=float(steps.levels[0]))
     if judgement.responded:
         facts = dataclasses.replace(facts, gain=judgement.gain)
         reaches = np.geomspace(0.5 * SMALLEST, max(most, SMALLEST), SIZES)

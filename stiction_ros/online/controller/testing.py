@@ -133,10 +133,8 @@ class ValveTestingController(LiveController):
         facts = facts_of_answer(answer, names[self._valve], *begins)
         reach, room = self.settings.valve_test_op, self.settings.valve_test_pv
         room = room or abs(facts.gain or 0.0) * reach + float(np.abs(pv - sp)[out])
-        middle = facts.pv
-        facts = dataclasses.replace(facts, op_limit=reach, pv_limit=(middle - room, middle + room))
-        margin = self.settings.jump_margin
-        self.test = ValveTest(facts, round(facts.hold / step), self._background, margin)
+        margin, hold = self.settings.jump_margin, round(facts.hold / step)
+        self.test = ValveTest(facts.within(reach, room), hold, self._background, margin)
         self._sp = sp
         begun = ModeChange(
             self._sample, ControlMode.VALVE_TEST, "a valve test begins", self._known.name

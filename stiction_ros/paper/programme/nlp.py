@@ -26,12 +26,7 @@ from stiction_ros.paper.programme.reduced_programme import (
     Solution,
     StemTable,
 )
-from stiction_ros.paper.programme.starts import (
-    apparent_stictions,
-    around,
-    candidates,
-    draw_starts,
-)
+from stiction_ros.paper.programme.starts import apparent_stictions, around, candidates, draw_starts
 from stiction_ros.paper.search_log import SolvedStart
 from stiction_ros.paper.smoothed_laws import final_smoothing
 from stiction_ros.records import Record
