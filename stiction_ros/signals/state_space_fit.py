@@ -123,7 +123,7 @@ def refine(model: Realisation, u: FloatArray, y: FloatArray, one_step: bool) -> 
     forced = responses(transition, model.c, drives, start)
     forced[:, :, m * n : m * n + p] += np.eye(p)
     target, columns = y.T - forced[:, :, -1], forced[:, :, :-1].reshape(samples * p, -1)
-    solution = np.linalg.lstsq(columns, target.ravel(), rcond=1e-10)[0]
+    solution = np.asarray(np.linalg.lstsq(columns, target.ravel(), rcond=1e-10)[0], dtype=float)
     return dataclasses.replace(
         model,
         b=solution[: m * n].reshape(m, n).T,
