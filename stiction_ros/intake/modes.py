@@ -4,7 +4,6 @@ import dataclasses
 import re
 import shlex
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +43,8 @@ def manual_marked(block: Block, rules: Rules, automatic: tuple[str, ...] | None)
     before = np.searchsorted(there, np.arange(len(column.values)), side="right") - 1
     codes = column.values[there[np.maximum(before, 0)]].astype(np.intp)
     shown = {code: column.known[code] for code in np.unique(codes).tolist()}
-    off = _not_automatic(block, column.name, _Modes(codes, shown), automatic, rules)
+    moved = _moves(block, codes, shown)
+    off = _not_automatic(column.name, set(shown.values()), moved, automatic, rules)
     for word in shown.values():
         rules.modes[word] = "not automatic" if word in off else "automatic"
     marked = np.isin(codes, [code for code, word in shown.items() if word in off])
@@ -57,18 +57,14 @@ def manual_marked(block: Block, rules: Rules, automatic: tuple[str, ...] | None)
     return dataclasses.replace(block, mask=mask)
 
 
-class _Modes(NamedTuple):
-    """The code of the mode of each row, shape (N,), and the word that each code stands for."""
-
-    codes: NDArray[np.intp]
-    shown: Mapping[int, str]
-
-
 def _not_automatic(
-    block: Block, name: str, modes: _Modes, automatic: tuple[str, ...] | None, rules: Rules
+    name: str,
+    words: set[str],
+    moved: Mapping[str, float],
+    automatic: tuple[str, ...] | None,
+    rules: Rules,
 ) -> set[str]:
-    """Return the modes that are not automatic, as they are shown."""
-    words = set(modes.shown.values())
+    """Return the modes that are not automatic, of the ``words`` that a column shows."""
     if automatic is not None:
         wanted = {word.casefold() for word in automatic}
         return {word for word in words if not _alike(word, wanted)}
@@ -82,7 +78,6 @@ def _not_automatic(
             "not say --auto WORD, with the word that stands for automatic"
         )
         return off
-    moved = _moves(block, modes)
     if all(number(word) is not None for word in words):
         still = {word for word, share in moved.items() if share <= STILL}
         busy = {word for word, share in moved.items() if share >= BUSY}
@@ -105,13 +100,13 @@ def _alike(word: str, wanted: set[str]) -> bool:
     return word.casefold() in wanted or (value is not None and value in map(number, wanted))
 
 
-def _moves(block: Block, modes: _Modes) -> dict[str, float]:
+def _moves(block: Block, codes: NDArray[np.intp], shown: Mapping[int, str]) -> dict[str, float]:
     """Return by mode the share of samples at which the busiest OP moves."""
     shares: dict[str, float] = {}
     for column in block.of("op").values():
         rows = np.flatnonzero(~column.blank & np.isfinite(column.values))
-        mode, moving = modes.codes[rows], np.diff(column.values[rows]) != 0
-        for code, word in modes.shown.items():
+        mode, moving = codes[rows], np.diff(column.values[rows]) != 0
+        for code, word in shown.items():
             if (inside := (mode[1:] == code) & (mode[:-1] == code)).any():
                 shares[word] = max(float(np.mean(moving[inside])), shares.get(word, 0.0))
     return shares
