@@ -90,9 +90,7 @@ def _refuse_foreign(directory: Path) -> None:
 
 def _listing_faults(path: Path, counts: Mapping[str, int]) -> list[str]:
     """Return what is wrong with ``metadata.yaml``; nothing for a single file."""
-    if not path.is_dir():
-        return []
-    if not (path / METADATA).is_file():
+    if path.is_dir() and not (path / METADATA).is_file():
         return [f"{METADATA} is missing"]
     try:
         return listing_notes(path, counts)
