@@ -63,6 +63,7 @@ class AugmentedCost:
     bounds, the squares of how far each sample is beyond them.
 
     Attributes:
+        bounds: of the outputs, shape (p, 2), or (1, 2) where none has any.
         soft: how dear that is, shape (p,); 0 where an output has no bounds.
     """
 
@@ -77,8 +78,8 @@ class AugmentedCost:
         self.model, self.weights, self.frictions = model, weights, tuple(frictions)
         self.part = HorizonCost(model, weights)
         self.horizon = weights.horizon
-        self._bounds = np.array([[-np.inf, np.inf]]) if bounds is None else bounds
-        bounded = np.isfinite(self._bounds).any(axis=1)
+        self.bounds = np.array([[-np.inf, np.inf]]) if bounds is None else bounds
+        bounded = np.isfinite(self.bounds).any(axis=1)
         # Half the square of the largest excess costs as much in the exact formulations.
         self.soft = np.where(bounded, slack_weights(self.part) / (2.0 * self.horizon), 0.0)
 
@@ -116,5 +117,5 @@ class AugmentedCost:
         """Return how far each output is beyond its bounds at samples 1 … N, shape (N, p)."""
         target = situation.target
         pv = self.part.outputs(situation.state - target.state, stems - target.stem) + target.pv
-        low, high = self._bounds.T
+        low, high = self.bounds.T
         return np.asarray(np.maximum(np.maximum(pv - high, low - pv), 0.0))

@@ -1,7 +1,6 @@
 """MPC as the paper prints it: stiction embedding, safeguarded by the hard model, and inversion."""
 
 import dataclasses
-import enum
 import functools
 from collections.abc import Sequence
 
@@ -21,25 +20,17 @@ from stiction_ros.paper.controllers.augmented_cost import (
     printed_frictions,
 )
 from stiction_ros.paper.controllers.searched_start import SearchedStart
-from stiction_ros.paper.controllers.smoothed_programme import SmoothedProgramme, SoftOutputs
+from stiction_ros.paper.controllers.smoothed_programme import SmoothedProgramme
 from stiction_ros.paper.controllers.weights import PaperTuning, WarmStart
 from stiction_ros.processes import LinearModel
 
 
-class Choice(enum.StrEnum):
-    """Which of the two sequences is applied."""
-
-    PROGRAMME = "programme"
-    WARM_START = "warm_start"
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class PrintedPlan(Plan):
-    """A plan, and what it was chosen from."""
+    """The cheaper of two plans by (22) under the hard model (4), and what both cost."""
 
-    choice: Choice  # the sequence with the lower cost (22) under the hard model (4)
     iterations: int  # of IPOPT
-    programme_cost: float  # programme_cost, warm_start_cost: (22), hard model; inf for none
+    programme_cost: float  # inf where the programme has no answer
     warm_start_cost: float
 
 
@@ -67,8 +58,7 @@ class PrintedEmbeddingMpc(Formulation):
         self.tuning, self.frictions = tuning, known
         self._limits = limits.stem
         self.cost = AugmentedCost(model, tuning.weights, known, limits.output)
-        self._programme = SmoothedProgramme(model, tuning, known, limits.stem)
-        self._soft = SoftOutputs(limits.output, self.cost.soft)
+        self._programme = SmoothedProgramme(self.cost, tuning, limits.stem)
         searches = tuning.warm_start is WarmStart.SEARCH
         self._search = SearchedStart(self.cost, limits.stem) if searches else None
         self._before: FloatArray | None = None  # u_{k−1}
@@ -85,10 +75,7 @@ class PrintedEmbeddingMpc(Formulation):
         cost = float("inf") if found.op is None else self.cost(situation, found.op)
         if not np.isfinite(min(cost, start_cost)):
             return None
-        if found.op is not None and cost <= start_cost:
-            choice, op = Choice.PROGRAMME, found.op
-        else:
-            choice, op = Choice.WARM_START, start
+        op = found.op if found.op is not None and cost <= start_cost else start
         self._before = op[0].copy()
         stems = self.cost.stems(op, last)
         return PrintedPlan(
@@ -97,7 +84,6 @@ class PrintedEmbeddingMpc(Formulation):
             self._outputs(situation, stems),
             self.cost.beyond(situation, stems).max(axis=0),
             self._jumps(stems, last),
-            choice=choice,
             iterations=found.iterations,
             programme_cost=cost,
             warm_start_cost=start_cost,
@@ -105,13 +91,11 @@ class PrintedEmbeddingMpc(Formulation):
 
     @functools.cached_property
     def _bounded_programme(self) -> SmoothedProgramme:
-        model, tuning = self.cost.model, self.tuning
-        return SmoothedProgramme(model, tuning, self.frictions, self._limits, self._soft)
+        return SmoothedProgramme(self.cost, self.tuning, self._limits, bounded=True)
 
     def _breaks_bounds(self, situation: PlanProblem, op: FloatArray) -> bool:
-        if not self._soft.weights.any():
-            return False
-        return bool(self.cost.beyond(situation, self.cost.stems(op, situation.stem)).any())
+        beyond = self.cost.beyond(situation, self.cost.stems(op, situation.stem))
+        return bool(self.cost.soft.any() and beyond.any())
 
     def warm_start(self, situation: PlanProblem) -> FloatArray:
         """Return the sequence that the programme starts from, shape (N, m), %."""

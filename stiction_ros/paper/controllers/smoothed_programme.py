@@ -1,15 +1,13 @@
 """The paper's stiction-embedding programme: (17)-(18) smoothed by (6), cost (22), by IPOPT."""
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.paper.controllers.augmented_cost import PlanProblem, PrintedFriction
+from stiction_ros.paper.controllers.augmented_cost import AugmentedCost, PlanProblem
 from stiction_ros.paper.controllers.weights import PaperTuning
-from stiction_ros.processes import LinearModel
 
 KEPT = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Maximum_Iterations_Exceeded")
 """IPOPT's words for an end whose answer is kept."""
@@ -22,14 +20,6 @@ class ProgrammeResult:
     op: FloatArray | None  # u over the horizon, shape (N, m), %, in the limits; None when failed
     cost: float  # (22) under the smoothed model; inf when failed
     iterations: int  # number of them
-
-
-@dataclasses.dataclass(frozen=True)
-class SoftOutputs:
-    """Bounds of the outputs, shape (p, 2), and what a squared excess of a sample costs, (p,)."""
-
-    bounds: FloatArray
-    weights: FloatArray
 
 
 class SmoothedProgramme:
@@ -49,21 +39,17 @@ class SmoothedProgramme:
     """
 
     def __init__(
-        self,
-        model: LinearModel,
-        tuning: PaperTuning,
-        frictions: Sequence[PrintedFriction | None],
-        limits: FloatArray,
-        soft: SoftOutputs | None = None,
+        self, cost: AugmentedCost, tuning: PaperTuning, limits: FloatArray, bounded: bool = False
     ) -> None:
-        """Build, for ``frictions`` with None for a healthy valve and ``limits``, (m, 2), %."""
+        """Build; ``limits`` (m, 2), %, ``bounded`` with the soft bounds of the cost."""
         from stiction_ros.paper.smoothed_laws import smooth_law  # compiled: slow to import
 
-        self.model, self.tuning, self._soft = model, tuning, soft
-        self._sticky = [j for j, friction in enumerate(frictions) if friction is not None]
-        pairs = [friction for friction in frictions if friction is not None]
+        self.cost, self.model, self.tuning = cost, cost.model, tuning
+        self._bounded = bounded
+        self._sticky = [j for j, friction in enumerate(cost.frictions) if friction is not None]
+        pairs = [friction for friction in cost.frictions if friction is not None]
         self._friction = np.array([(f.static_friction, f.dynamic_friction) for f in pairs])
-        horizon, m, n = tuning.weights.horizon, len(model.stem0), model.order
+        horizon, m, n = cost.horizon, len(limits), self.model.order
         self._laws = [smooth_law(str(friction.law)) for friction in pairs]
         self._directed = [row for row, law in enumerate(self._laws) if law.states > 1]
         self._shape = (horizon, m + len(self._sticky) + len(self._directed) + n)
@@ -77,7 +63,7 @@ class SmoothedProgramme:
     def _build(self) -> Any:
         import casadi
 
-        model, weights = self.model, self.tuning.weights
+        model, weights = self.model, self.cost.weights
         m, n, sticky = len(model.stem0), model.order, self._sticky
         start = casadi.SX.sym("z_0", n), casadi.SX.sym("chi_before", m)
         goal, before = casadi.SX.sym("chi_ss", m), casadi.SX.sym("u_before", m)
@@ -108,8 +94,8 @@ class SmoothedProgramme:
             cost += _square(moved - stem, weights.move) + _square(op - goal, weights.op)
             if weights.op_move is not None:
                 cost += _square(op - last, weights.op_move)
-            if self._soft is not None:
-                cost += _excess(casadi.mtimes(model.c, after) + pv_goal, self._soft)
+            if self._bounded:
+                cost += self._excess(casadi.mtimes(model.c, after) + pv_goal)
             state, stem, last = after, moved, op
         cost += _square(state, weights.terminal)
         problem = {
@@ -169,17 +155,16 @@ class SmoothedProgramme:
         turns = np.sign(moves[:, self._directed])
         return np.hstack([op, stuck, turns, states]).reshape(-1)
 
+    def _excess(self, pv: Any) -> Any:
+        import casadi
 
-def _excess(pv: Any, soft: SoftOutputs) -> Any:
-    import casadi
-
-    cost = casadi.SX(0.0)
-    for j in np.flatnonzero(soft.weights):
-        low, high = soft.bounds[j]
-        above = casadi.fmax(pv[j] - high, 0.0) if np.isfinite(high) else 0.0
-        below = casadi.fmax(low - pv[j], 0.0) if np.isfinite(low) else 0.0
-        cost += soft.weights[j] * (above**2 + below**2)
-    return cost
+        cost, dear = casadi.SX(0.0), self.cost.soft
+        for j in np.flatnonzero(dear):
+            low, high = self.cost.bounds[j]
+            above = casadi.fmax(pv[j] - high, 0.0) if np.isfinite(high) else 0.0
+            below = casadi.fmax(low - pv[j], 0.0) if np.isfinite(low) else 0.0
+            cost += dear[j] * (above**2 + below**2)
+        return cost
 
 
 def _square(vector: Any, weight: FloatArray) -> Any:

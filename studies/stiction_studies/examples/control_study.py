@@ -239,7 +239,11 @@ def _run(
 
     run = simulate_closed_loop(plant, control, schedule, samples, seed)
     plans = [result.plan for result in results]
-    chosen = Counter(plan.choice.value for plan in plans if isinstance(plan, PrintedPlan))
+    chosen = Counter(
+        "programme" if plan.programme_cost <= plan.warm_start_cost else "warm_start"
+        for plan in plans
+        if isinstance(plan, PrintedPlan)
+    )
     statuses = Counter(result.status.value for result in results)
     times = np.array([1e3 * result.solve_time for result in results])
     return ColumnRun(run, times, dict(chosen), dict(statuses))

@@ -17,8 +17,8 @@ def solve(at: PlanProblem, chosen: PaperTuning | None = None) -> ProgrammeResult
     """From OP at the target, where the stem stays or goes by itself."""
     chosen = chosen or tuning(MODEL)
     op = np.tile(at.target.stem, (chosen.weights.horizon, 1))
-    stems = AugmentedCost(MODEL, chosen.weights, FRICTIONS).stems(op, at.stem)
-    return SmoothedProgramme(MODEL, chosen, FRICTIONS, LIMITS).solve(at, op, stems)
+    cost = AugmentedCost(MODEL, chosen.weights, FRICTIONS)
+    return SmoothedProgramme(cost, chosen, LIMITS).solve(at, op, cost.stems(op, at.stem))
 
 
 @pytest.mark.parametrize("away", [2.0, 12.0])
@@ -45,13 +45,12 @@ def test_it_is_blind_to_other_patterns_of_slips() -> None:
 
 def test_one_programme_serves_many_situations() -> None:
     chosen = tuning(MODEL)
-    programme = SmoothedProgramme(MODEL, chosen, FRICTIONS, LIMITS)
+    cost = AugmentedCost(MODEL, chosen.weights, FRICTIONS)
+    programme = SmoothedProgramme(cost, chosen, LIMITS)
     for away in (12.0, -15.0):
         at = situation(MODEL, away)
         op = np.tile(at.target.stem, (chosen.weights.horizon, 1))
-        again = programme.solve(
-            at, op, AugmentedCost(MODEL, chosen.weights, FRICTIONS).stems(op, at.stem)
-        )
+        again = programme.solve(at, op, cost.stems(op, at.stem))
         fresh = solve(at)
         assert again.op is not None
         assert fresh.op is not None
@@ -82,9 +81,9 @@ def test_a_healthy_loop_needs_no_tanh() -> None:
     frictions: tuple[HeStiction | None, ...] = (None, None)
     at = situation(MODEL, 3.0)
     op = np.tile(at.target.stem, (chosen.weights.horizon, 1))
-    found = SmoothedProgramme(MODEL, chosen, frictions, LIMITS).solve(at, op, op)
-    assert found.op is not None
     cost = AugmentedCost(MODEL, chosen.weights, frictions)
+    found = SmoothedProgramme(cost, chosen, LIMITS).solve(at, op, op)
+    assert found.op is not None
     random = np.random.default_rng(1)
     others = [cost(at, found.op + random.normal(size=op.shape)) for _ in range(50)]
     assert cost(at, found.op) < min(others)

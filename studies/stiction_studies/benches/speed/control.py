@@ -228,7 +228,7 @@ def _plain_ipopt(design: ControlDesign) -> Callable[[PlanProblem], FloatArray]:
     augmented = AugmentedWeights(*told, stem=nothing, op=nothing)
     healthy: Frictions = (None,) * m
     cost = AugmentedCost(design.model, augmented, healthy)
-    programme = SmoothedProgramme(design.model, PaperTuning(augmented), healthy, design.limits.stem)
+    programme = SmoothedProgramme(cost, PaperTuning(augmented), design.limits.stem)
 
     def solve(at: PlanProblem) -> FloatArray:
         start = np.tile(at.stem, (cost.horizon, 1))
