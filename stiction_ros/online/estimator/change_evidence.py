@@ -120,17 +120,21 @@ def _noise_of(
     return OutputReference(model, noise.ar, std) if 0.0 < std < math.inf else None
 
 
-class LeadIn(NamedTuple):
-    """Samples before a change, and where the stems were."""
+class Course(NamedTuple):
+    """Samples in succession, and where the stems were."""
 
+    begin: int  # number of the first one
     op: FloatArray  # op, stem: shape (n, m), %
     stem: FloatArray
     pv: FloatArray  # shape (n, p)
 
-    @classmethod
-    def last_of(cls, op: FloatArray, stem: FloatArray, pv: FloatArray) -> "LeadIn":
-        """Return the last samples of longer signals, as many as are of use."""
-        return cls(*(signal[-2 * START_ROWS :].copy() for signal in (op, stem, pv)))
+    def before(self, sample: int) -> "Course | None":
+        """Return the last ones before a sample, as many as are of use; None if not known."""
+        end = sample - self.begin
+        if not 0 < end <= len(self.op):
+            return None
+        first = max(end - 2 * START_ROWS, 0)
+        return Course(self.begin + first, *(signal[first:end].copy() for signal in self[1:]))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -189,10 +193,6 @@ class Evidence:
                 for j, valve in enumerate(reference.valves)
             ]
             self._gains.append(np.column_stack(gains))
-
-    def lead_in(self, end: int) -> LeadIn:
-        """Return what is of use of the samples before one of the window."""
-        return LeadIn.last_of(self.op[:end], self.stem[:end], self.pv[:end])
 
     def stems(self, valve: int, first: int, grid: FloatArray) -> FloatArray:
         """Return stems of ``valve`` by its law from ``first`` on, shape (n − first, G), %.

@@ -15,7 +15,7 @@ from stiction_ros.identification.friction import find_law
 from stiction_ros.identification.identification_options import AUTO
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.member_loops import is_set_point
-from stiction_ros.online.estimator.change_evidence import LEAST_ROWS, Evidence, LeadIn, Reference
+from stiction_ros.online.estimator.change_evidence import LEAST_ROWS, Course, Evidence, Reference
 from stiction_ros.online.estimator.friction_change import (
     ChangeRule,
     ChangeStatus,
@@ -148,8 +148,8 @@ class LiveEstimator:
         self._published: Mapping[str, TrustedFriction] = {}
         self._last = -1
         self._reference: Reference | None = None
-        self._anchor: tuple[int, LeadIn] | None = None  # where the window began anew
-        self._seen: tuple[int, Evidence] | None = None  # that of the last window, and its begin
+        self._since = 0  # first sample at which the frictions are as they are trusted
+        self._course: Course | None = None  # up to that, or to the end of the last window
         self._changed: dict[str, _Change] = {}
 
     def retune(self, settings: EstimatorSettings) -> None:
@@ -198,7 +198,7 @@ class LiveEstimator:
         """Empty the window, as after samples that were missed; trust is kept."""
         self._op.clear()
         self._pv.clear()
-        self._anchor = self._seen = None
+        self._since, self._course = 0, None
 
     def conclude(self, end: int, found: Identification, record: Record | None = None) -> FitUpdate:
         """Apply the rule of trust to the fit of the window ``record`` that ends at ``end``.
@@ -217,13 +217,14 @@ class LiveEstimator:
         if record is not None and not known and trusted and self._reference is None:
             self._reference = Reference.of(found, record)
             if self._reference is not None:
-                self._anchor = end + 1, LeadIn.last_of(record.op, found.stem, record.pv)
+                self._since, begin = end + 1, end + 1 - len(record)
+                self._course = Course(begin, record.op, found.stem, record.pv)
         model = None
         if not alike(trusted, self._published):
             outputs = found.outputs
             if self._young(end) and self._reference is not None:
                 outputs = tuple(output.model for output in self._reference.outputs)
-            model = self._describe(FitUpdate(end, found, trusted, None), outputs)
+            model = self.describe(FitUpdate(end, found, trusted, None), outputs)
             self._published = trusted
         return FitUpdate(end, found, trusted, model, changes)
 
@@ -254,7 +255,6 @@ class LiveEstimator:
         evidence = self._evidence(self._reference, end, record)
         if evidence is None:
             return ()
-        self._seen = end + 1 - len(evidence.op), evidence
         changes = []
         for name, friction in trusted.items():
             j = self.valves.index(name)
@@ -270,14 +270,11 @@ class LiveEstimator:
     def _evidence(self, reference: Reference, end: int, record: Record) -> Evidence | None:
         """Return the evidence of a window, from where its stems are known; None if nowhere."""
         begin = end + 1 - len(record)
-        before = None
-        seen, since = self._seen, 0 if self._seen is None else begin - self._seen[0]
-        if self._anchor is not None and self._anchor[0] < begin and seen is not None and since > 0:
-            self._anchor = begin, seen[1].lead_in(since)  # the window has slid over its anchor
-        if self._anchor is not None and begin <= self._anchor[0] <= end:
-            record, before = record.part(self._anchor[0] - begin, len(record)), self._anchor[1]
-        if not len(record):
+        first = max(self._since, begin)
+        if first > end:
             return None
+        record = record.part(first - begin, len(record))
+        before = None if self._course is None else self._course.before(first)
         stem, sure = record.op.copy(), 0
         laws: dict[int, Stiction] = {}
         for name, friction in self.trusted.items():
@@ -293,44 +290,37 @@ class LiveEstimator:
             sure = max(sure, int(apart[-1]) + 1 if len(apart) else 0)
         if len(stem) - sure < LEAST_ROWS:
             return None
-        op, pv = record.op[sure:], record.pv[sure:]
-        if before is None:
-            return Evidence(reference, op, stem[sure:], pv, laws)
-        return Evidence(
-            reference,
-            np.vstack([before.op, op]),
-            np.vstack([before.stem, stem]),
-            np.vstack([before.pv, pv]),
-            laws,
-            len(before.op),
-        )
+        course, lead = Course(first + sure, record.op[sure:], stem[sure:], record.pv[sure:]), 0
+        if before is not None:
+            joined = (np.vstack(pair) for pair in zip(before[1:], course[1:], strict=True))
+            course, lead = Course(before.begin, *joined), len(before.op)
+        self._course = course
+        return Evidence(reference, course.op, course.stem, course.pv, laws, lead)
 
     def _begin_anew(self, end: int, change: FrictionChange) -> None:
         """Trust what a change has left, and let the window begin with it."""
         first = end + 1 - change.samples
         self._trust[change.valve].renew(change.friction)
         self._changed[change.valve] = _Change(change.status, first)
-        seen, self._anchor, self._seen = self._seen, None, None
-        if seen is not None and len(seen[1].op) > change.samples:
-            self._anchor = first, seen[1].lead_in(len(seen[1].op) - change.samples)
+        self._since = first
+        self._course = None if self._course is None else self._course.before(first)
         for signal in (self._op, self._pv):
             kept = list(signal)[max(len(signal) - (self._last + 1 - first), 0) :]
             signal.clear()
             signal.extend(kept)
 
-    def describe(self, update: FitUpdate) -> LoopModel:
-        """Return the loop as a fit found it, with the friction that is trusted after it."""
-        return self._describe(update, update.identification.outputs)
-
-    def _describe(self, update: FitUpdate, models: Sequence[OutputModel]) -> LoopModel:
+    def describe(
+        self, update: FitUpdate, outputs: Sequence[OutputModel] | None = None
+    ) -> LoopModel:
+        """Return the loop as a fit found it, or with other outputs, and the trusted friction."""
         found, trusted = update.identification, update.trusted
         valves = []
         for name in self.valves:
             friction = trusted.get(name)
             effects = [] if friction is None else [friction.behaviour().to_mapping()]
             valves.append({"name": name, "effects": effects})
+        models = found.outputs if outputs is None else outputs
         equations = (one.equation(Noise(one.noise_std, NoiseEntry.EQUATION)) for one in models)
-        outputs = [equation.to_mapping() for equation in equations]
         provenance = [
             self._provenance(name, update, found.samples)
             for name in self.valves
@@ -341,7 +331,7 @@ class LiveEstimator:
                 "loop": self.loop,
                 "sample_time": self.sample_time,
                 "valves": valves,
-                "process": {"kind": "arx", "outputs": outputs},
+                "process": {"kind": "arx", "outputs": [one.to_mapping() for one in equations]},
                 "provenance": provenance,
             },
             f"model identified for {self.loop}",
