@@ -6,6 +6,7 @@ from collections import Counter, deque
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.online.input.sample_grid import keep
 
 UNPAIRED = 5000  # samples of PV kept while their OP is missing
 FAR = 100  # samples ahead: a stamp beyond is another clock, not a gap
@@ -105,9 +106,7 @@ class Pairing:
         """Take in an OP that was sent and return the samples that are complete now."""
         if not self._applied:
             return self._take_op(stamp, op)
-        self._sent[stamp] = op
-        if len(self._sent) > 2 * SILENT:
-            del self._sent[next(iter(self._sent))]
+        keep(self._sent, stamp, op, 2 * SILENT)
         return []
 
     def add_applied(self, stamp: int, op: FloatArray) -> list[PairedSample]:
@@ -119,18 +118,14 @@ class Pairing:
         return self._take_op(stamp, op)
 
     def _take_op(self, stamp: int, op: FloatArray) -> list[PairedSample]:
-        self._op[stamp] = op
-        if len(self._op) > UNPAIRED:
-            del self._op[next(iter(self._op))]
+        keep(self._op, stamp, op, UNPAIRED)
         return self._complete()
 
     # ---- stamps ----------------------------------------------------------------------------
 
     def _accept(self, stamp: int, pv: FloatArray) -> None:
         self._last = stamp
-        self._pv[stamp] = pv
-        if len(self._pv) > UNPAIRED:
-            del self._pv[next(iter(self._pv))]
+        keep(self._pv, stamp, pv, UNPAIRED)
 
     def _stray(self, stamp: int, pv: FloatArray, last: int) -> list[PairedSample]:
         """Leave out a stamp of the past or the far future, unless it makes up a new run."""

@@ -4,6 +4,8 @@ from collections import deque
 
 import numpy as np
 
+from stiction_ros.online.input.sample_grid import keep
+
 OPEN = 1000  # samples whose OP is awaited; older ones count as unanswered
 KEPT = 20_000  # the latest answered samples, of which the figures tell
 FIGURES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
@@ -24,9 +26,7 @@ class RoundTrips:
         if stamp in self._open:
             return
         self.asked += 1
-        self._open[stamp] = now
-        if len(self._open) > OPEN:
-            del self._open[next(iter(self._open))]
+        keep(self._open, stamp, now, OPEN)
 
     def answer(self, stamp: int, now: float) -> None:
         """Note that the OP of ``stamp`` is there at ``now``, s; only the first one counts."""

@@ -7,6 +7,7 @@ from collections import Counter
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.online.input.sample_grid import keep
 
 OLDEST = 3  # samples: an OP that is later than this was meant for another state of the loop
 KEPT = 1000  # messages whose sample has not come
@@ -37,9 +38,7 @@ class AppliedOp:
     def add(self, stamp: int, op: FloatArray, ours: bool = True) -> None:
         """Take in the OP, shape (m,), that acts at ``stamp``, and whether it is ours."""
         self._told.pop(stamp, None)
-        self._told[stamp] = Given(op, ours=ours)
-        if len(self._told) > KEPT:
-            del self._told[next(iter(self._told))]
+        keep(self._told, stamp, Given(op, ours=ours), KEPT)
 
     def in_force(self, stamp: int) -> FloatArray | None:
         """Return the newest OP before the sample at ``stamp``, or None."""

@@ -3,17 +3,14 @@
 import dataclasses
 import math
 from collections import Counter
-from typing import TypeVar
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.online.input.op_port import AppliedOp, Given
-from stiction_ros.online.input.sample_grid import Pace, SampleGrid, Succession
+from stiction_ros.online.input.sample_grid import Pace, SampleGrid, Succession, keep
 from stiction_ros.online.input.samples import PortRules, PortState, Sample, SetPointPreview
 from stiction_ros.online.input.signal_check import SignalCheck
-
-T = TypeVar("T")
 
 SECOND = 1e9
 LATEST = 2_140_000_000 * 10**9  # ns: stamps end in 2038, and those that follow must fit
@@ -86,7 +83,7 @@ class InputPort:
         else:
             self.counts["wrong tags" if sp is None else "refused sp"] += 1
         if self.rules.lockstep and self.rules.scheduled and self._sp is not None:
-            _keep(self._sp_at, stamp, self._sp)
+            keep(self._sp_at, stamp, self._sp, KEPT)
 
     def add_dv(self, now: float, stamp: int, dv: FloatArray | None) -> None:
         """Take in measured disturbances (d,); None: not every tag is there."""
@@ -95,7 +92,7 @@ class InputPort:
         else:
             self.counts["wrong tags" if dv is None else "refused dv"] += 1
         if self.rules.lockstep:
-            _keep(self._dv_at, stamp, self._dv)
+            keep(self._dv_at, stamp, self._dv, KEPT)
 
     def add_applied(self, now: float, stamp: int, op: FloatArray | None, ours: bool = True) -> None:
         """Take in the OP (m,) that the valves are given at ``stamp``, and whether it is ours."""
@@ -338,7 +335,7 @@ class InputPort:
     def _missing(self, answered: bool) -> Sample:
         self._grid.advance(None)
         stamp = self._grid.stamp
-        _keep(self._missed, self._grid.number, True)
+        keep(self._missed, self._grid.number, True, KEPT)
         return self._sample(None, stamp, answered, self._given(stamp))
 
     def _given(self, stamp: int) -> Given:
@@ -366,9 +363,3 @@ class InputPort:
         if self.rules.lockstep:
             sp, dv = self._sp_at.get(stamp, sp), self._dv_at.get(stamp)
         return Sample(self._grid.number, stamp, pv, sp, dv, answered, begins, given)
-
-
-def _keep(waiting: dict[int, T], stamp: int, value: T) -> None:
-    waiting[stamp] = value
-    if len(waiting) > KEPT:
-        del waiting[next(iter(waiting))]

@@ -1,11 +1,21 @@
 """Stamps and numbers of the samples of a run, and what stamps that do not fit may mean."""
 
 from collections import deque
+from typing import TypeVar
+
+T = TypeVar("T")
 
 SUCCESSION = 10  # refused stamps that rise make a new run
 FOLLOWED = 8  # samples after which most of a shift of the stamps is followed
 INTERVALS = 9  # of which the middle one tells how fast samples really come
 LEAST_INTERVALS = 3
+
+
+def keep(waiting: dict[int, T], stamp: int, value: T, most: int) -> None:
+    """Keep a value until its stamp is asked for; of more than ``most`` the oldest is let go."""
+    waiting[stamp] = value
+    if len(waiting) > most:
+        del waiting[next(iter(waiting))]
 
 
 class SampleGrid:
