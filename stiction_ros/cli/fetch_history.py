@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
 
     require_asyncua()
     check_address(options.url, "URL")
-    loops = _chosen(TagMap.load(find_config(options.tags)), options.loop)
+    loops = TagMap.load(find_config(options.tags)).chosen(options.loop, "--loop")
     span = Span(_stamp(options.begin, "--from"), _stamp(options.end, "--to"))
     if span.end <= span.begin:
         raise InputError("is not after --from", where="--to")
@@ -73,14 +73,6 @@ def _tags(loop: LoopTags) -> list[str]:
     found = [tag for output in loop.outputs for tag in (output.pv, output.sp) if tag]
     found += [valve.op_read for valve in loop.valves]
     return [*found, *(valve.mode for valve in loop.valves if valve.mode)]
-
-
-def _chosen(told: TagMap, wanted: list[str]) -> list[LoopTags]:
-    known = {loop.loop: loop for loop in told.loops}
-    for name in wanted:
-        if name not in known:
-            raise InputError(f"no loop {name!r}", where="--loop", fix=f"use {', '.join(known)}")
-    return [known[name] for name in wanted or known]
 
 
 def _stamp(text: str, where: str) -> int:

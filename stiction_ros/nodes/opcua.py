@@ -40,7 +40,7 @@ class OpcuaNode(ManagedNode):
         require_asyncua()
         told = TagMap.load(find_config(self.needed("tags", "tag map", "*.tags.yaml")))
         self._writes = settings.write
-        self._loops = self._chosen(told)
+        chosen = self._chosen(told)
         self._url = settings.url or told.server
         check_address(self._url, "opcua: url")
         self._credentials = Credentials.of(settings)
@@ -52,29 +52,20 @@ class OpcuaNode(ManagedNode):
         self.bridges: dict[str, LoopBridge] = {}
         self._topics: dict[str, LoopTopics] = {}
         self._by_tag: dict[str, list[str]] = {}
-        for tags in self._loops:
+        for tags in chosen:
             self._add(tags, identity)
         self._wakeup = self.create_guard_condition(self._serve)
 
     def _chosen(self, told: TagMap) -> tuple[LoopTags, ...]:
         """Return the loops that are bridged; those to be written must be able to."""
-        known = {tags.loop: tags for tags in told.loops}
-        chosen = self.settings.loops
-        for key, names in (("loops", chosen), ("write", self._writes)):
-            for name in names:
-                if name not in known:
-                    raise InputError(
-                        f"no loop {name!r} in the tag map",
-                        where=f"opcua: {key}",
-                        fix=f"use {', '.join(known)}",
-                    )
-        for name in self._writes:
-            if known[name].grant is None:
+        chosen = told.chosen(self.settings.loops, "opcua: loops")
+        written = told.chosen(self._writes, "opcua: write") if self._writes else ()
+        for tags in written:
+            if tags.grant is None:
                 raise InputError(
-                    f"loop {name!r} has no section write in the tag map", where="opcua: write"
+                    f"loop {tags.loop!r} has no section write in the tag map", where="opcua: write"
                 )
-        wanted = dict.fromkeys((*chosen, *self._writes)) if chosen else known
-        return tuple(known[name] for name in wanted)
+        return tuple(dict.fromkeys((*chosen, *written)))
 
     def _add(self, tags: LoopTags, identity: int) -> None:
         """Build bridge, topics and services of one loop."""
@@ -99,18 +90,16 @@ class OpcuaNode(ManagedNode):
             self.offer(f"{prefix}give_back_grant", functools.partial(self._on_give_back, name))
 
     def configuration(self) -> dict[str, Any]:
-        return {"url": self._url, "bridged": [tags.loop for tags in self._loops]}
+        return {"url": self._url, "bridged": list(self.bridges)}
 
     def hardware(self) -> str:
         return self._url
 
     def activate(self) -> None:
-        read = [tag for tags in self._loops for tag in tags.read_tags()]
-        writing = [tags for tags in self._loops if tags.loop in self._writes]
+        writing = [bridge.tags for bridge in self.bridges.values() if bridge.rules.writes]
         written = {tag: use for tags in writing for tag, use in tags.uses()}
-        publishing = self.settings.publishing
-        tags = tuple(dict.fromkeys(read))
-        settings = LinkSettings(self._url, self._credentials, tags, written, publishing)
+        read, publishing = tuple(self._by_tag), self.settings.publishing
+        settings = LinkSettings(self._url, self._credentials, read, written, publishing)
         self._link = PlantLink(settings, self._wake)
         self._link.start()
         shortest = min(bridge.period for bridge in self.bridges.values())

@@ -4,7 +4,7 @@ import dataclasses
 import enum
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -173,6 +173,15 @@ class TagMap:
         written = [tag for loop in loops for tag, _ in loop.uses()]
         _once(written, f"{path}: loops", "written tag")
         return cls(server, loops)
+
+    def chosen(self, names: Sequence[str], where: str) -> tuple[LoopTags, ...]:
+        """Return the loops of these names, each once, or all; an unknown one is an InputError."""
+        known = {loop.loop: loop for loop in self.loops}
+        for name in names:
+            if name not in known:
+                fix = f"use {', '.join(known)}"
+                raise InputError(f"no loop {name!r} in the tag map", where=where, fix=fix)
+        return tuple(known[name] for name in dict.fromkeys(names or known))
 
 
 def check_address(address: str, where: str) -> None:
