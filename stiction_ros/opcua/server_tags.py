@@ -32,7 +32,7 @@ class ServerTags:
 
     def __init__(self, client: "Client", read: Sequence[str], written: Mapping[str, Use]) -> None:
         """Take the tags; :meth:`find` and :meth:`subscribe` ask the server."""
-        self._client, self._read, self._written = client, read, written
+        self._client, self._written = client, written
         self._names: dict[ua.NodeId, list[str]] = {}
         self._writers: dict[ua.NodeId, str] = {}  # the first tag of each written node
         self.nodes: dict[str, ua.NodeId] = {}

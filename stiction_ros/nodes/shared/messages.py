@@ -16,6 +16,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.online.health import LEVELS
 from stiction_ros.online.input.samples import picked
 from stiction_ros.records.storage.bag_metadata import INFINITE_NS, Qos
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:  # nodes that control nothing load nothing of control
     from stiction_ros.control import StepResult
 
 SECOND = 1_000_000_000
-LEVELS = {"ok": b"\x00", "warn": b"\x01", "error": b"\x02"}
 
 
 def to_ns(stamp: Time) -> int:
@@ -130,7 +130,7 @@ def status(
     return DiagnosticStatus(
         name=name,
         hardware_id=hardware,
-        level=LEVELS[level],
+        level=bytes([LEVELS.index(level)]),
         message=text,
         values=[KeyValue(key=key, value=str(value)) for key, value in values],
     )
