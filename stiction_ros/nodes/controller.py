@@ -34,13 +34,13 @@ from stiction_ros.nodes.shared.messages import (
 )
 from stiction_ros.nodes.shared.peers import PLANTS, publishers_of
 from stiction_ros.online.controller.plans import rehearse, thinned_plan
+from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.controller.testing import ValveTestingController
 from stiction_ros.online.handover.hand_over import AtOnce
 from stiction_ros.online.handover.known_friction import read_offer
 from stiction_ros.online.input.port import InputPort
 from stiction_ros.online.input.port_health import PortHealth, keys
 from stiction_ros.online.input.samples import PortRules, Sample, SetPointPreview
-from stiction_ros.online.node_settings import ControllerNodeSettings
 from stiction_ros.texts import json_text
 
 QUICKEST, SLOWEST = 0.02, 0.25  # s between two looks for samples that are due
@@ -51,10 +51,10 @@ DRAINED = ("op_applied", "sp", "dv", "pv")  # what is read to the end before a s
 class ControllerNode(ManagedNode):
     """Thin shell around :class:`stiction_ros.online.controller.testing.ValveTestingController`."""
 
-    settings: ControllerNodeSettings
+    settings: LiveControllerSettings
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("controller", ControllerNodeSettings, **kwargs)
+        super().__init__("controller", LiveControllerSettings, **kwargs)
         self.listening = False  # whether a PV is for this node: it is active
 
     def configure(self) -> None:
@@ -126,7 +126,7 @@ class ControllerNode(ManagedNode):
         self._running_since = time.monotonic()
         self.go()
 
-    def retune(self, settings: ControllerNodeSettings) -> None:
+    def retune(self, settings: LiveControllerSettings) -> None:
         self.live.retune(settings)
         if settings.speed != self.settings.speed:
             period = self.model.sample_time / settings.speed

@@ -17,10 +17,9 @@ from stiction_ros.nodes.shared.peers import PLANTS
 from stiction_ros.online.estimator.live import FitUpdate
 from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.online.health import Notice, stopped_after
-from stiction_ros.online.loop_estimator import Fit, Keys, LoopEstimator, Told
+from stiction_ros.online.loop_estimator import EstimatorNodeSettings, Fit, Keys, LoopEstimator, Told
 from stiction_ros.online.monitor.gap_finding import GapFinding
 from stiction_ros.online.monitor.gap_monitor import GapMonitor
-from stiction_ros.online.node_settings import EstimatorNodeSettings
 
 COUNTED = ("bridged", "repeated", "stale", "future")
 SHOWN_AGAIN = 3.0  # s: a plant in lockstep shows its sample each second

@@ -11,15 +11,16 @@ import numpy as np
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
+from stiction_ros.online.estimator.live import EstimatorSettings, FitUpdate, LiveEstimator, fit
 from stiction_ros.online.handover.hand_over import AtOnce
 from stiction_ros.online.health import Notice
 from stiction_ros.online.input.samples import picked
 from stiction_ros.online.monitor.gap_finding import GapFinding
-from stiction_ros.online.monitor.gap_monitor import GapLook, GapMonitor
-from stiction_ros.online.node_settings import EstimatorNodeSettings
-from stiction_ros.online.pairing import NEW_RUN, PairedSample
+from stiction_ros.online.monitor.gap_monitor import GapLook, GapMonitor, MonitorRule
+from stiction_ros.online.pairing import BRIDGED, NEW_RUN, PairedSample, Pairing
+from stiction_ros.online.plain_settings import PacedSettings
 from stiction_ros.records import Record
+from stiction_ros.settings import setting
 from stiction_ros.texts import json_text
 
 SECOND = 10**9
@@ -57,6 +58,27 @@ class Fit:
             return "samples are missing"
         said = str(self.error) if isinstance(self.error, InputError) else repr(self.error)
         return f"window not usable: {said}"
+
+
+@dataclasses.dataclass(frozen=True)
+class EstimatorNodeSettings(EstimatorSettings, MonitorRule, PacedSettings):
+    """The live estimator's settings, those of the monitor, and what belongs to the node."""
+
+    loop: str = setting("loop", "name of the loop, for the models it publishes", fixed=True)
+    sample_time: float = setting(1.0, "seconds between two samples", low=1e-6, fixed=True)
+    monitor_model: str = setting(
+        "",
+        "loop model file the monitor compares with; empty for the loop as it is identified",
+        fixed=True,
+    )
+
+    def pairing(self) -> Pairing:
+        """Return what pairs PV and OP; no bridge is longer than what a fit can wait for."""
+        return Pairing(self.sample_time, *self.bridges())
+
+    def bridges(self) -> tuple[int, int]:
+        """Return window and longest bridge of the pairing, samples."""
+        return self.window, min(BRIDGED, self.fit_latency - 1)
 
 
 Told = Notice | Fit | GapLook | GapFinding

@@ -31,10 +31,9 @@ from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.controller.testing import ValveTestingController
 from stiction_ros.online.estimator.live import FitUpdate
 from stiction_ros.online.input.signal_check import SignalCheck
-from stiction_ros.online.loop_estimator import Fit, LoopEstimator, Told
+from stiction_ros.online.loop_estimator import EstimatorNodeSettings, Fit, LoopEstimator, Told
 from stiction_ros.online.monitor.gap_finding import GapFinding
 from stiction_ros.online.monitor.gap_monitor import GapLook
-from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
 from stiction_ros.online.pairing import PairedSample
 from stiction_ros.online.plain_settings import (
     FitSchedule,
@@ -46,7 +45,7 @@ from stiction_ros.settings import from_mapping as settings_from_mapping
 
 NODE_SETTINGS: Mapping[str, type[NodeSettings]] = {
     "plant": PlantNodeSettings,
-    "controller": ControllerNodeSettings,
+    "controller": LiveControllerSettings,
     "estimator": EstimatorNodeSettings,
     "recorder": RecorderNodeSettings,
 }

@@ -14,8 +14,9 @@ from stiction_ros import __version__
 from stiction_ros.config_files import find_config
 from stiction_ros.effects import Stiction
 from stiction_ros.online.controller.live import ModeChange
+from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.estimator.live import FitUpdate
-from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
+from stiction_ros.online.loop_estimator import EstimatorNodeSettings
 from stiction_ros.online.session import LiveRun, Scenario, run_live
 from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.storage.bag_metadata import Qos
@@ -28,7 +29,7 @@ WINDOW = 300
 
 def settings_of_run(
     law: Stiction | None = None, window: int = WINDOW
-) -> tuple[Scenario, EstimatorNodeSettings, ControllerNodeSettings]:
+) -> tuple[Scenario, EstimatorNodeSettings, LiveControllerSettings]:
     """Return the scenario and the settings of its two nodes; ``law`` in place of the valve's."""
     scenario = Scenario.load(find_config("siso.scenario.yaml"))
     estimator = EstimatorNodeSettings(
@@ -46,7 +47,7 @@ def settings_of_run(
         scenario = dataclasses.replace(scenario, plant=plant)
     given = dict(scenario.nodes["controller"]) | SCHEDULE | {"horizon": 30, "wait_for": ()}
     given |= {key: tuple(value) for key, value in given.items() if isinstance(value, list)}
-    controller = ControllerNodeSettings(**given)
+    controller = LiveControllerSettings(**given)
     scenario = dataclasses.replace(scenario, estimator=estimator, controller=controller)
     return scenario, estimator, controller
 

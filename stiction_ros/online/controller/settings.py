@@ -6,7 +6,7 @@ from stiction_ros.control import ControlMode
 from stiction_ros.control_settings import ControlSettings
 from stiction_ros.online.handover.offers import OfferRule
 from stiction_ros.online.handover.watch import WatchRule
-from stiction_ros.online.plain_settings import FitSchedule
+from stiction_ros.online.plain_settings import FitSchedule, PacedSettings
 from stiction_ros.settings import setting
 
 AUTO = "auto"
@@ -30,8 +30,10 @@ class ValveTestRule:
 
 
 @dataclasses.dataclass(frozen=True)
-class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule, OfferRule, ValveTestRule):
-    """Everything that can be set on the controller of a running loop."""
+class LiveControllerSettings(
+    ControlSettings, FitSchedule, WatchRule, OfferRule, ValveTestRule, PacedSettings
+):
+    """Everything that can be set on the controller of a running loop, as its parameters."""
 
     mode: str = setting(
         AUTO,
@@ -44,3 +46,14 @@ class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule, OfferRule,
         "samples in which the set-point goes from PV to its value after a start or a hold",
         low=0,
     )
+    model: str = setting("", "loop model file the controller is built from", fixed=True)
+    sp_source: str = setting(
+        "schedule",
+        "schedule: in lockstep each pv has its own sp; external: the last (transient local) holds",
+        choices=("schedule", "external"),
+        fixed=True,
+    )
+    fit_timeout: float = setting(
+        120.0, "s to wait for an awaited fit", low=0.1, high=1e5, beside=("pace", "lockstep")
+    )
+    prediction_points: int = setting(11, "points of the published plan", low=1, high=1001)

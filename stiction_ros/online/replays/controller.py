@@ -8,13 +8,13 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
+from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.controller.testing import ValveTestingController
 from stiction_ros.online.input.op_port import Given
 from stiction_ros.online.input.port import LONGEST_GAP
 from stiction_ros.online.input.samples import Sample
 from stiction_ros.online.input.signal_check import SignalCheck
 from stiction_ros.online.loop_estimator import SECOND
-from stiction_ros.online.node_settings import ControllerNodeSettings
 from stiction_ros.online.replays.bag import ReplayBag
 from stiction_ros.online.replays.result import Comparison
 from stiction_ros.records.run.events import ModeChange, without_repeats
@@ -31,7 +31,7 @@ class ReplayedControl:
 
 def replay_controller(
     bag: ReplayBag,
-    settings: ControllerNodeSettings,
+    settings: LiveControllerSettings,
     model: LoopModel,
     offers: tuple[tuple[str, int], ...],
     origin: int,
@@ -76,7 +76,7 @@ def replay_controller(
 
 
 def _samples(
-    bag: ReplayBag, settings: ControllerNodeSettings, model: LoopModel, notes: list[str]
+    bag: ReplayBag, settings: LiveControllerSettings, model: LoopModel, notes: list[str]
 ) -> Iterator[Sample]:
     """Yield every sample that has all the controller waits for, oldest first."""
     lockstep = settings.pace == "lockstep"

@@ -6,8 +6,7 @@ from typing import Any
 
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.health import Notice
-from stiction_ros.online.loop_estimator import Fit, LoopEstimator
-from stiction_ros.online.node_settings import EstimatorNodeSettings
+from stiction_ros.online.loop_estimator import EstimatorNodeSettings, Fit, LoopEstimator
 from stiction_ros.online.replays.bag import DOCUMENTS, ReplayBag, read_status
 
 Progress = Callable[[float], None]

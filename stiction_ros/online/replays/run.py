@@ -7,8 +7,8 @@ from typing import TypeVar
 from stiction_ros import __version__
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.loop_estimator import SECOND, Fit
-from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
+from stiction_ros.online.controller.settings import LiveControllerSettings
+from stiction_ros.online.loop_estimator import SECOND, EstimatorNodeSettings, Fit
 from stiction_ros.online.replays.bag import NodeConfig, ReplayBag, fit_told, read_replay_bag
 from stiction_ros.online.replays.controller import ReplayedControl, replay_controller
 from stiction_ros.online.replays.estimator import Progress, ReplayedEstimates, replay_estimator
@@ -98,7 +98,7 @@ def _control(bag: ReplayBag, estimator: ReplayedEstimates, where: str) -> Replay
     config = bag.controller
     if config is None or config.model is None:
         return None
-    settings = _settings(ControllerNodeSettings, config, where)
+    settings = _settings(LiveControllerSettings, config, where)
     model = LoopModel.from_mapping(dict(config.model), f"{where}: {config.node}/config: model")
     step, origin = round(model.sample_time * SECOND), estimator.origin
     came = {token: model.ops_before for token, model in bag.models.items()}

@@ -10,7 +10,7 @@ from typing import Any
 
 from stiction_ros.cli.shared.node_processes import ros_environment
 from stiction_ros.online.controller.live import HISTORY_SAMPLES
-from stiction_ros.online.node_settings import EstimatorNodeSettings
+from stiction_ros.online.loop_estimator import EstimatorNodeSettings
 from stiction_ros.settings import from_mapping
 from stiction_studies.faults.loop.node_process import NodeProcess
 

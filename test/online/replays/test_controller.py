@@ -6,7 +6,7 @@ import pytest
 from stiction_ros.config_files import find_config
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.controller.live import LiveController
-from stiction_ros.online.node_settings import ControllerNodeSettings
+from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.replays.bag import ReplayBag, Signal
 from stiction_ros.online.replays.controller import replay_controller
 from stiction_ros.online.replays.result import Comparison
@@ -29,9 +29,9 @@ def signal(kind: str, k: int, value: float) -> Signal:
 
 def run(
     pace: str, *, passed: range = range(0), lost: range = range(0), stuck: range = range(0)
-) -> tuple[ControllerNodeSettings, list[Signal]]:
+) -> tuple[LiveControllerSettings, list[Signal]]:
     """A run whose samples were ``passed`` over, without PV, or with the valve's OP ``stuck``."""
-    settings = ControllerNodeSettings(**SETTINGS, pace=pace)
+    settings = LiveControllerSettings(**SETTINGS, pace=pace)
     live = LiveController(settings, MODEL)
     live.begin(np.array([47.0]))
     signals = [signal("op_applied", -1, 47.0)]
@@ -53,7 +53,7 @@ def run(
     return settings, signals
 
 
-def replayed(settings: ControllerNodeSettings, signals: list[Signal]) -> Comparison:
+def replayed(settings: LiveControllerSettings, signals: list[Signal]) -> Comparison:
     return replay_controller(bag(signals), settings, MODEL, (), S).op
 
 

@@ -15,8 +15,8 @@ from bag_making import Bag
 from monitored_loops import RULE, WATCHED, loop, record, shifted
 
 from stiction_ros import __version__
+from stiction_ros.online.loop_estimator import EstimatorNodeSettings
 from stiction_ros.online.monitor.gap_monitor import GapMonitor
-from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.online.replays.result import Comparison, Match
 from stiction_ros.online.replays.run import replay
 from stiction_ros.records.bag.messages import read_messages

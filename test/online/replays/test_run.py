@@ -17,7 +17,7 @@ from stiction_ros.effects import KanoStiction
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification, IdentificationOptions
 from stiction_ros.online.estimator.live import fit
-from stiction_ros.online.node_settings import EstimatorNodeSettings
+from stiction_ros.online.loop_estimator import EstimatorNodeSettings
 from stiction_ros.online.replays.bag import read_replay_bag
 from stiction_ros.online.replays.estimator import replay_estimator
 from stiction_ros.online.replays.result import Match, Replay, first_difference
