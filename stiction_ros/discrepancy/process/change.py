@@ -16,13 +16,13 @@ from stiction_ros.discrepancy.decision.explanation import (
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.least_squares import left_by
 from stiction_ros.discrepancy.measures import GAUSS_NEWTON, MARGIN, NORMAL, ROUNDING
-from stiction_ros.discrepancy.process.equations import equation_of, process_with, with_equation
 from stiction_ros.discrepancy.process.slower import GAIN, Changeable
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
 from stiction_ros.effects.behaviour import BoolArray
+from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.processes import ArxProcess
+from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, Process
 from stiction_ros.signals.autoregression import whiten
 
 TINY_STEP = 0.02  # of the probes, at which it has settled
@@ -113,7 +113,9 @@ class _Search:
         self.model, self.runs, self.effects, self.output = model, runs, effects, output
         self.declared = declared
         self.smooth = [k for k, each in enumerate(effects) if each.fit.candidate.smooth]
-        self.equation = Changeable(equation_of(model, output))
+        if not isinstance(model.process, ArxProcess):
+            raise InputError("the process is no arx process", where=model.name)
+        self.equation = Changeable(model.process.equations[output])
         self.figures = self.equation.figures
         self.least = np.array([each.least for each in self.figures])
         self.most = np.array([each.most for each in self.figures])
@@ -227,8 +229,9 @@ class _Search:
         for k, each in enumerate(np.eye(len(self.free))):
             if self.free[k]:
                 equation = self.equation.changed(self.values + self.probes * each)
-                process, step = run.model.process, run.model.sample_time
-                other = process_with(process, self.output, equation, step)
+                other = _with_equation(
+                    run.model.process, self.output, equation, run.runs.sample_time
+                )
                 moved.append((run.gap_behind(other, self.output) - gap) / self.probes[k])
         return np.column_stack(moved)
 
@@ -250,7 +253,10 @@ class _Search:
 
     def changed(self, values: FloatArray) -> LoopModel:
         """Return the model with other figures of this output, shape (figures,)."""
-        return with_equation(self.model, self.output, self.equation.changed(values))
+        document, told = self.model.to_mapping(), self.equation.changed(values).to_mapping()
+        entry = document["process"]["outputs"][self.output]
+        entry.update({key: told[key] for key in ("a", "b", "delay")})
+        return LoopModel.from_mapping(document, self.model.name)
 
     def changes(self, name: str) -> list[ProcessChange]:
         """Return the figures that are another, by the tag of the output."""
@@ -265,3 +271,13 @@ class _Search:
                 ProcessChange(name, own.what, value, (low, high), "s" if late else "1", model)
             )
         return found
+
+
+def _with_equation(process: Process, output: int, own: ArxOutput, sample_time: float) -> Process:
+    """Return an ARX process with another equation of one output, behind its effects if any."""
+    if isinstance(process, AlteredProcess):
+        inner = _with_equation(process.inner, output, own, sample_time)
+        return AlteredProcess(inner, process.effects, sample_time)
+    assert isinstance(process, ArxProcess)
+    equations = (*process.equations[:output], own, *process.equations[output + 1 :])
+    return ArxProcess(equations, process.valves, process.model.stem0, process.model.pv0)

@@ -2,13 +2,14 @@
 
 import dataclasses
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.discrepancy.measures import ROUNDING
-from stiction_ros.discrepancy.process.equations import Equation
 from stiction_ros.effects import FloatArray
+from stiction_ros.processes import ArxOutput
 from stiction_ros.processes.sampled import pulses
 
 FRACTIONS = 41  # of a sample, at which the dead time's is looked for
@@ -139,7 +140,7 @@ class Figure:
     least: float
     most: float
     roots: tuple[int, ...] = ()  # which poles or zeros it moves; a pair moves together
-    valve: int | None = None  # whose zeros; None for poles
+    valve: str | None = None  # whose zeros; None for poles
     lasts: float | None = None  # time constant, samples; None for gain and delay
 
     @property
@@ -156,82 +157,76 @@ class Changeable:
 
     Attributes:
         own: as the model has it.
-        figures: that may be off.
+        figures: that may be off, gain and dead time first.
     """
 
-    def __init__(self, own: Equation) -> None:
+    def __init__(self, own: ArxOutput) -> None:
         """Take the equation."""
         self.own = own
-        plants = [held(own.denominator, b) if len(b) else None for b in own.b]
-        known = all(plant is not None or not len(b) for plant, b in zip(plants, own.b, strict=True))
-        self._plants: list[Held | None] | None = plants if known else None
-        self._poles = np.roots(own.denominator).astype(complex)
+        denominator = np.array([1.0, *own.a])
+        plants = {valve: held(denominator, np.array(b)) for valve, b in own.b.items()}
+        known = {valve: plant for valve, plant in plants.items() if plant is not None}
+        self._plants = known if len(known) == len(plants) else {}
+        self._poles = np.roots(denominator).astype(complex)
         whole = np.where(np.abs(self._poles) < ROUNDING, ROUNDING, self._poles)
         least = 1.0 / (1.0 + MOST[GAIN]) - 1.0
-        self.figures = [
-            Figure(GAIN, least, MOST[GAIN]),
-            Figure(DELAY, -float(max(own.delay)), MOST[DELAY]),
-        ]
+        shortest = -float(max(own.delay.values(), default=0))
+        self.figures = [Figure(GAIN, least, MOST[GAIN]), Figure(DELAY, shortest, MOST[DELAY])]
         self.figures += _of_roots(np.log(whole), TIME_CONSTANT, None)
-        for j, plant in enumerate(plants if known else []):
-            if plant is not None:
-                self.figures += _of_roots(zeros_of(plant), LEAD, j)
+        for valve, plant in self._plants.items():
+            self.figures += _of_roots(zeros_of(plant), LEAD, valve)
 
-    def changed(self, values: FloatArray) -> Equation:
+    def changed(self, values: FloatArray) -> ArxOutput:
         """Return the equation with its figures changed, shares and samples, shape (figures,).
 
-        Its gain is changed by ``gain`` alone.
+        Its gain is changed by the first figure alone.
         """
         if not values.any():
             return self.own
-        by_name = dict.fromkeys((GAIN, DELAY), 0.0)
-        for figure, value in zip(self.figures, values.tolist(), strict=True):
-            if figure.what in by_name:
-                by_name[figure.what] += value
-        gain, late = 1.0 + by_name[GAIN], by_name[DELAY]
+        gain, late = 1.0 + float(values[0]), float(values[1])
         stretches = self._factors(values, TIME_CONSTANT, None, len(self._poles))
-        if self._plants is None:
+        if not self._plants:
             return self._of_means(gain, late, stretches)
-        b, delays = [], []
-        poles = self._poles
-        for j, (plant, each, delay) in enumerate(
-            zip(self._plants, self.own.b, self.own.delay, strict=True)
-        ):
-            if plant is None:
-                b.append(each)
-                delays.append(delay)
-                continue
-            led = self._factors(values, LEAD, j, len(zeros_of(plant)))
+        b, delays, poles = {}, {}, self._poles
+        for valve, plant in self._plants.items():
+            delay, led = (
+                self.own.delay[valve],
+                self._factors(values, LEAD, valve, len(zeros_of(plant))),
+            )
             other, more = later(slower(plant, stretches, led), max(late, -float(delay)))
             poles = np.exp(other.poles)
-            b.append(gain * other.sampled())
-            delays.append(max(delay + more, 0))
-        return Equation(np.real(np.poly(poles))[1:], tuple(b), tuple(delays))
+            b[valve] = gain * other.sampled()
+            delays[valve] = max(delay + more, 0)
+        return self._with(np.real(np.poly(poles))[1:], b, delays)
 
-    def _factors(self, values: FloatArray, what: str, valve: int | None, count: int) -> FloatArray:
+    def _factors(self, values: FloatArray, what: str, valve: str | None, count: int) -> FloatArray:
         factors = np.ones(count)
         for figure, value in zip(self.figures, values.tolist(), strict=True):
             if (figure.what, figure.valve) == (what, valve):
                 factors[list(figure.roots)] = 1.0 + value
         return factors
 
-    def _of_means(self, gain: float, late: float, stretches: FloatArray) -> Equation:
-        own, poles = self.own, self._poles
-        moved = stretches != 1.0
+    def _of_means(self, gain: float, late: float, stretches: FloatArray) -> ArxOutput:
+        poles, moved = self._poles, stretches != 1.0
         slow = poles.copy()
         slow[moved] = np.exp(np.log(poles[moved]) / stretches[moved])
         level = float(np.real(np.prod((1.0 - slow[moved]) / (1.0 - poles[moved]))))
-        b, delays = [], []
-        for each, delay in zip(own.b, own.delay, strict=True):
-            whole = math.floor(max(delay + late, 0.0))
-            share = max(delay + late, 0.0) - whole
-            b.append(gain * level * np.convolve(each, [1.0 - share, share]) if len(each) else each)
-            delays.append(whole if len(each) else delay)
-        a = np.real(np.poly(slow))[1:] if len(slow) else own.a
-        return Equation(np.asarray(a), tuple(b), tuple(delays))
+        b, delays = {}, {}
+        for valve, taps in self.own.b.items():
+            whole = math.floor(max(self.own.delay[valve] + late, 0.0))
+            share = max(self.own.delay[valve] + late, 0.0) - whole
+            b[valve] = gain * level * np.convolve(taps, [1.0 - share, share])
+            delays[valve] = whole
+        return self._with(np.real(np.atleast_1d(np.poly(slow)))[1:], b, delays)
+
+    def _with(
+        self, a: FloatArray, b: Mapping[str, FloatArray], delays: Mapping[str, int]
+    ) -> ArxOutput:
+        taps = {valve: tuple(each.tolist()) for valve, each in b.items()}
+        return dataclasses.replace(self.own, a=tuple(a.tolist()), b=taps, delay=delays)
 
 
-def _of_roots(roots: ComplexArray, what: str, valve: int | None) -> list[Figure]:
+def _of_roots(roots: ComplexArray, what: str, valve: str | None) -> list[Figure]:
     """Return a figure for every root of G(s), in 1/sample, that lasts a sample, pairs as one."""
     found = []
     for k, root in enumerate(roots.tolist()):

@@ -8,9 +8,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
-from stiction_ros.discrepancy.process.equations import Equation
 from stiction_ros.discrepancy.process.slower import Changeable, held, later, slower, zeros_of
 from stiction_ros.effects import FloatArray
+from stiction_ros.processes import ArxOutput
 
 LAGS = st.floats(1.5, 30.0)
 
@@ -65,7 +65,11 @@ def test_what_is_no_held_plant_is_none() -> None:
     assert held(np.array([1.0, -0.5]), np.array([1.0, 1.0, 1.0])) is None
 
 
-def answer(own: Equation, count: int = 200) -> FloatArray:
+def equation(a: FloatArray, b: FloatArray, delay: int) -> ArxOutput:
+    return ArxOutput("PV1", tuple(a.tolist()), {"V1": tuple(b.tolist())}, {"V1": delay})
+
+
+def answer(own: ArxOutput, count: int = 200) -> FloatArray:
     """Return the response to a step, shape (count,)."""
     values = np.zeros(count)
     past = len(own.a)
@@ -73,15 +77,15 @@ def answer(own: Equation, count: int = 200) -> FloatArray:
     for k in range(count):
         for i in range(min(past, k)):
             values[k] -= own.a[i] * values[k - 1 - i]
-        for i, b in enumerate(own.b[0].tolist()):
-            at = k - 1 - own.delay[0] - i
+        for i, b in enumerate(own.b["V1"]):
+            at = k - 1 - own.delay["V1"] - i
             values[k] += b * stem[at] if at >= 0 else 0.0
     return values
 
 
 def test_every_figure_of_an_equation_moves_what_it_says() -> None:
     a, b = sampled([], [12.0, 5.0], 0.7)
-    changeable = Changeable(Equation(a[1:], (b,), (3,)))
+    changeable = Changeable(equation(a[1:], b, 3))
     kinds = [figure.what for figure in changeable.figures]
     assert kinds == ["gain", "delay", "time_constant", "time_constant"]
     assert sorted(f.lasts for f in changeable.figures if f.lasts) == pytest.approx([5.0, 12.0])
@@ -99,7 +103,7 @@ def test_every_figure_of_an_equation_moves_what_it_says() -> None:
 
 
 def test_other_equations_have_means_of_whole_dead_times() -> None:
-    own = Equation(np.array([0.5]), (np.array([1.0]),), (2,))
+    own = equation(np.array([0.5]), np.array([1.0]), 2)
     late = Changeable(own).changed(np.array([0.0, 0.5]))
-    assert late.delay == (2,)
-    assert late.b[0] == pytest.approx([0.5, 0.5])
+    assert late.delay == {"V1": 2}
+    assert late.b["V1"] == pytest.approx([0.5, 0.5])
