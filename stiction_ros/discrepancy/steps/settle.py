@@ -49,16 +49,14 @@ def without_slips(effects: Sequence[AddedEffect]) -> tuple[AddedEffect, ...]:
     """
     frictions = [each for each in effects if about(each.effect).family == FRICTION]
     bands = {each.place.replace("valve:", "load:"): band_of(each) for each in frictions}
-    step = StepDisturbance.effect
-    steps = [each for each in effects if each.effect == step and each.place in bands]
-    gone: set[int] = set()
+    steps = [e for e in effects if e.effect == StepDisturbance.effect and e.place in bands]
     for one, other in itertools.combinations(steps, 2):
-        sizes = [float(each.fit.factors[0]) for each in (one, other)]
-        largest, pair = max(map(abs, sizes)), {id(one), id(other)}
-        same = one.fit.candidate.key == other.fit.candidate.key and not pair & gone
-        if same and largest <= bands[one.place] and abs(sum(sizes)) <= CANCEL * largest:
-            gone |= pair
-    return tuple(each for each in effects if id(each) not in gone)
+        first, second = float(one.fit.factors[0]), float(other.fit.factors[0])
+        larger = max(abs(first), abs(second))
+        slips = larger <= bands[one.place] and abs(first + second) <= CANCEL * larger
+        if slips and one.place == other.place:
+            return without_slips([e for e in effects if e is not one and e is not other])
+    return tuple(effects)
 
 
 def band_of(friction: AddedEffect) -> float:
