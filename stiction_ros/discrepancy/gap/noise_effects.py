@@ -1,35 +1,26 @@
 """Noise beyond the declared one, told as an effect: what wanders, how far, and where it enters."""
 
 import dataclasses
-import functools
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 
+from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.candidate.base import figures_of, spans_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.noise_laws import (
-    FLOOR,
-    Block,
-    Law,
-    declared_block,
-    laws_of,
-    white_block,
-)
+from stiction_ros.discrepancy.fit.uncertainty import SMOOTH
+from stiction_ros.discrepancy.gap.noise_laws import FLOOR, Block, Law, declared_block, laws_of
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
 from stiction_ros.discrepancy.likelihood.noise import SURPRISE
-from stiction_ros.discrepancy.likelihood.state_noise import innovations, left_by_columns
+from stiction_ros.discrepancy.likelihood.state_noise import left_by_columns, steady_gain
 from stiction_ros.discrepancy.measures import MARGIN, NORMAL
 from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
 from stiction_ros.signals.autoregression import TINY
 
-CLOSE, SAME, TURNS = 1e-2, 0.05, 60  # of the search: figures, their likelihood, turns
-REJECTED = 8.0  # −2 log likelihood, above that of the best figures
-SHORTEST_WAY = 1e-3
-FLAT = 1e-3  # curvature of the likelihood over a logarithm, below which it has none
+POINTS, LATTICES = 13, 4  # of a lattice along each figure, and how many are laid
+FALLS = 4.0  # by which the bound falls from lattice to lattice
 CLEAR = 0.3  # by which the logarithm of a figure has to be inside of its range
 NO_LAW = 30.0  # BIC by which a law may miss an autoregression and still be its name
 
@@ -63,24 +54,13 @@ def noise_effects(
         The laws that beat the declared noise, with its rounding; the best first, and those that are
         near it.
     """
-    found = _at_their_best(base, output, declared)
-    without = _Judge(base, output, declared).score(white_block(0.0))
-    enough = without.fitted + without.held - least * int(base.blocks[output].train.sum())
-    better = [each for each in found if each.score < enough]
+    judge, own = _Judge(base, output, declared), base.under_declared(output)
+    fitted = [judge.fitted(law) for law in laws_of(base, output, declared)]
+    enough = own.bic(0) + own.held_minus_two_log - least * own.rows
+    better = [each for each in fitted if each is not None and each.score < enough]
     lasts = float(base.run.runs.time.max())
     near = sorted(_without_walks(better, lasts), key=lambda each: each.score)
     return [each for each in near if each.score <= near[0].score + NO_LAW]
-
-
-def _at_their_best(base: Baseline, output: int, declared: DeclaredNoise) -> list[NoiseEffect]:
-    """Return the laws that have figures, kept."""
-    name = ("noise effects", output, declared.std, declared.ar.tobytes())
-    if name not in base.known:
-        judge = _Judge(base, output, declared)
-        fitted = [judge.fitted(law) for law in laws_of(base, output, declared)]
-        base.known[name] = [each for each in fitted if each is not None]
-    found: list[NoiseEffect] = base.known[name]
-    return found
 
 
 def _without_walks(laws: list[NoiseEffect], lasts: float) -> list[NoiseEffect]:
@@ -113,102 +93,67 @@ class _Judge:
     """
 
     def __init__(self, base: Baseline, output: int, declared: DeclaredNoise) -> None:
-        runs = base.run.runs
         self.own, self.blocks = declared_block(base, output, declared), base.blocks[output]
-        values = np.column_stack([base.run.gap[:, output], base.columns[output]])
-        self.values, self.seen = np.ascontiguousarray(values.T), runs.usable[output]
-        self.begins = np.zeros(len(runs), dtype=bool)
-        self.begins[[rows.start for rows in runs.slices]] = True
+        self.records, seen = base.run.runs.slices, base.run.runs.usable[output]
+        self.values = np.vstack([base.run.gap[:, output], base.columns[output].T])
+        rows = np.arange(len(seen))
+        for each in self.values:  # what is no measurement is drawn between its neighbours
+            each[~seen] = np.interp(rows[~seen], rows[seen], each[seen])
 
     def score(self, block: Block) -> _Score:
         """Return how likely the states of a law are beside those of the declared noise."""
         own, blocks = self.own, self.blocks
         unit = max(own.r, float(np.trace(own.q)), TINY)
-        white, variances = innovations(
-            block_diag(own.a, block.a),
-            block_diag(own.q, block.q) / unit,
-            np.concatenate([own.c, block.c]),
-            max(own.r, FLOOR * unit) / unit,
-            block_diag(own.start, block.start) / unit,
-            self.values,
-            self.seen,
-            self.begins,
-        )
-        if not np.isfinite(white).all():
+        a, c = block_diag(own.a, block.a), np.concatenate([own.c, block.c])
+        white = max(own.r, FLOOR * unit) / unit
+        steady = steady_gain(a, block_diag(own.q, block.q) / unit, c, white)
+        if steady is None:
             return _Score(math.inf, 0.0, 1.0)
-        left, logs = left_by_columns(white, self.values, blocks.train), np.log(variances)
+        gain, missed = steady
+        over, under = (np.real(np.poly(each)) for each in (a, a - np.outer(gain, c)))
+        parts = [lfilter(over, under, self.values[:, rows], axis=1) for rows in self.records]
+        left = left_by_columns(np.hstack(parts), self.values, blocks.train)
         inside, outside = left[blocks.train], left[blocks.held]
         variance = max(float(inside @ inside) / len(inside), TINY)
         log = math.log(2.0 * math.pi * variance)
         outside = np.minimum(outside**2 / variance, SURPRISE**2)
-        fitted = len(inside) * (log + 1.0) + float(logs[blocks.train].sum())
-        held = len(outside) * log + float(logs[blocks.held].sum()) + float(outside.sum())
-        return _Score(fitted, held, math.sqrt(variance / unit))
-
-    def loss(self, law: Law, x: FloatArray) -> float:
-        """Return −2 log likelihood of the fitted rows; inf beyond the range of the figures."""
-        low, high = law.range
-        if np.any(x < low) or np.any(x > high):
-            return math.inf
-        return self.score(law.block(x)).fitted
+        held = len(outside) * log + float(outside.sum())
+        return _Score(len(inside) * (log + 1.0), held, math.sqrt(variance / missed / unit))
 
     def fitted(self, law: Law) -> NoiseEffect | None:
         """Return a law with its figures; None where one of them holds nothing out."""
-        from scipy.optimize import minimize
-
-        loss = functools.partial(self.loss, law)
-        options = {"xatol": CLOSE, "fatol": SAME, "maxiter": TURNS}
-        tried = [minimize(loss, x, method="Nelder-Mead", options=options) for x in law.starts]
-        best = min(tried, key=lambda each: float(each.fun))
-        found, (low, high) = np.asarray(best.x), law.range
-        bound = np.any(found < low + CLEAR) or np.any(found > high - CLEAR)
-        if not math.isfinite(best.fun) or bound:
-            return None  # a figure on the bound of its range is no name
-        score = self.score(law.block(found))
+        points, scores = self.lattice(law)
+        fitted = np.array([score.fitted for score in scores])
+        best, (low, high) = int(np.argmin(fitted)), law.range
+        found = points[best]
+        if np.any(found < low + CLEAR) or np.any(found[1:] > high[1:] - CLEAR):
+            return None  # on the bound of its range: then it is no name
         rows = max(int(self.blocks.train.sum()), 2)
         price = len(found) * math.log(rows) + MARGIN
         first = np.eye(len(found))[0]  # is a size: σ is its unit
-        behaviour = law.behaviour(found + math.log(score.louder) * first)
-        ends = _ends(loss, found, law.range)
-        if not all(np.isfinite(end).all() for _, end in ends):
-            return None  # an interval that holds nothing out is no name
+        behaviour = law.behaviour(found + math.log(scores[best].louder) * first)
         figures = [figures_of(behaviour)]
-        for side, end in ends:
-            scale = math.log(self.score(law.block(end)).louder)
-            scale += side * NORMAL / math.sqrt(2.0 * rows)
-            figures.append(figures_of(law.behaviour(end + scale * first)))
-        whole = score.fitted + score.held + price
+        for k in np.flatnonzero(fitted - fitted[best] <= SMOOTH).tolist():
+            for side in (-NORMAL, NORMAL):
+                scale = math.log(scores[k].louder) + side / math.sqrt(2.0 * rows)
+                figures.append(figures_of(law.behaviour(points[k] + scale * first)))
+        whole = scores[best].fitted + scores[best].held + price
         return NoiseEffect(law.place, behaviour, spans_of(figures), whole)
 
+    def lattice(self, law: Law) -> tuple[FloatArray, list[_Score]]:
+        """Return the figures that the likelihood does not reject, and some about them.
 
-def _ends(
-    loss: Callable[[FloatArray], float], found: FloatArray, limits: tuple[FloatArray, FloatArray]
-) -> list[tuple[float, FloatArray]]:
-    """Return the side and the point of both ends of each figure's 95 %, by the curvature."""
-    count, step = len(found), 0.1
-    shifts = step * np.eye(count)
-    centre = loss(found)
-    bend = np.zeros((count, count))
-    for i in range(count):
-        for j in range(i, count):
-            corner = loss(found + shifts[i] + shifts[j]) + loss(found - shifts[i] - shifts[j])
-            other = loss(found + shifts[i] - shifts[j]) + loss(found - shifts[i] + shifts[j])
-            bend[i, j] = bend[j, i] = (corner - other) / (4.0 * step**2)
-        plus, minus = loss(found + shifts[i]), loss(found - shifts[i])
-        bend[i, i] = (plus + minus - 2.0 * centre) / step**2
-    if not np.isfinite(bend).all():
-        return [(-1.0, limits[0]), (1.0, limits[1])]
-    sizes, axes = np.linalg.eigh(0.5 * bend)
-    spread = (axes / np.maximum(sizes, FLAT)) @ axes.T  # what does not bend is not known at all
-    ways = NORMAL * spread / np.sqrt(np.diag(spread))  # each figure's end, the others at their best
-    ends = []
-    for way in ways.T:
-        for side in (-1.0, 1.0):
-            share = side  # a valley may be bent: back to what the likelihood does not reject
-            while abs(share) > SHORTEST_WAY:
-                end = np.clip(found + share * way, *limits)
-                if loss(end) < centre + REJECTED:
-                    break
-                share *= 0.5
-            ends.append((side, end))
-    return ends
+        Each lattice lies about what the one before has left, by a bound that falls to the last
+        one's: what is coarse misses the bottom of a narrow valley.
+        """
+        low, high = law.range
+        for turn in reversed(range(LATTICES)):
+            step = (high - low) / (POINTS - 1)
+            meshed = np.meshgrid(*np.linspace(low, high, POINTS).T, indexing="ij")
+            points = np.stack([each.ravel() for each in meshed], axis=1)
+            scores = [self.score(law.block(point)) for point in points]
+            fitted = np.array([score.fitted for score in scores])
+            kept = points[fitted - fitted.min() <= SMOOTH * FALLS ** max(turn - 1, 0)]
+            low = np.maximum(kept.min(axis=0) - step, law.range[0])
+            high = np.minimum(kept.max(axis=0) + step, law.range[1])
+        return points, scores

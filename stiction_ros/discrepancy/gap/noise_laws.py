@@ -1,10 +1,8 @@
 """Laws of a noise beyond the declared one, by their states: what wanders, and where it enters."""
 
 import dataclasses
-import functools
 import itertools
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -14,10 +12,10 @@ from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, Ran
 from stiction_ros.signals.autoregression import companion
 from stiction_ros.signals.state_space import responses
 
-TIMES = (5.0, 30.0, 150.0)  # samples, of the first guesses of a coloured noise's memory
-RATIOS = (0.03, 0.3)  # of a random walk's step to the declared noise, first guesses
-SMALLEST = 1e-4  # of the declared noise, that is searched
+SMALLEST, LARGEST = 1e-4, 10.0  # of the declared noise and of what is left, that are searched
 FLOOR = 1e-6  # of the declared variance, that every measurement has
+
+Path = tuple[FloatArray, FloatArray, FloatArray]  # A, b, c
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,29 +25,36 @@ class Block:
     a: FloatArray  # a, q: shape (n, n)
     q: FloatArray
     c: FloatArray  # what is seen of them, shape (n,)
-    # their covariance at the first sample; what is left open of it is a free column
-    start: FloatArray
     r: float = 0.0  # variance of a white part
 
 
 @dataclasses.dataclass(frozen=True)
 class Law:
-    """A noise by the logarithms of its figures: its states beside those of the declared one.
+    """A noise by the logarithms of its figures, the first of which is a size.
 
-    The first figure is a size. It has no upper bound: the declared noise may be nothing beside it.
+    Far above the declared noise it may be any: σ, which is left open, is the unit of both.
     """
 
     place: str  # where it enters, as loop models name it
-    starts: list[FloatArray]  # figures with which their search begins
+    kind: type[ColouredDisturbance] | type[RandomWalkDisturbance]  # what it is
+    path: Path | None  # from there to the output; None where it is added to it
     range: tuple[FloatArray, FloatArray]  # the lowest and the highest figures
-    block: Callable[[FloatArray], Block]  # its states by its figures
-    behaviour: Callable[[FloatArray], Behaviour]  # by its figures, too
+    sample_time: float  # s
 
+    def behaviour(self, x: FloatArray) -> Behaviour:
+        """Return it with its figures."""
+        return self.kind(*np.exp(x).tolist())
 
-def white_block(variance: float) -> Block:
-    """Return noise without a memory."""
-    nothing = np.zeros((0, 0))
-    return Block(nothing, nothing, np.zeros(0), nothing, variance)
+    def block(self, x: FloatArray) -> Block:
+        """Return its states: those of the path, and the noise itself as the last one."""
+        size, *lasts = np.exp(x).tolist()
+        keep = math.exp(-self.sample_time / lasts[0]) if lasts else 1.0
+        a, b, c = self.path or (np.zeros((0, 0)), np.zeros(0), np.zeros(0))
+        count = len(a)
+        whole, driven = np.zeros((2, count + 1, count + 1))
+        whole[:count, :count], whole[:count, count], whole[count, count] = a, b, keep
+        driven[count, count] = size**2 * (1.0 - keep**2 if lasts else self.sample_time)
+        return Block(whole, driven, np.append(c, 0.0 if self.path else 1.0))
 
 
 def laws_of(base: Baseline, output: int, declared: DeclaredNoise) -> list[Law]:
@@ -61,67 +66,28 @@ def laws_of(base: Baseline, output: int, declared: DeclaredNoise) -> list[Law]:
         declared: its noise.
     """
     model, step = base.run.model, base.run.runs.sample_time
-    tag, unit = model.outputs[output], declared.std
-
-    one = np.ones((1, 1))
-
-    def coloured(x: FloatArray) -> Block:
-        keep, variance = math.exp(-step / math.exp(float(x[1]))), math.exp(2.0 * float(x[0]))
-        return Block(keep * one, variance * (1.0 - keep**2) * one, np.ones(1), variance * one)
-
-    def walk(x: FloatArray) -> Block:
-        return Block(one, math.exp(2.0 * float(x[0])) * step * one, np.ones(1), 0.0 * one)
-
-    def walked(x: FloatArray) -> Behaviour:
-        return RandomWalkDisturbance(math.exp(float(x[0])))
-
-    spread = float(np.std(base.noise[output].residual[base.blocks[output].train]))
-    size = max(spread, 2.0 * unit)
-    lasts = float(base.run.runs.time.max())
-    least, endless = math.log(SMALLEST * unit), np.full(1, math.inf)
+    left = float(np.std(base.noise[output].residual[base.blocks[output].train]))
+    sizes = np.array([SMALLEST * declared.std, LARGEST * max(left, declared.std)])
+    times = np.array([0.5 * step, float(base.run.runs.time.max())])
+    added, walked = f"disturbance:{model.outputs[output]}", sizes / math.sqrt(step)
+    coloured = np.log(np.column_stack([sizes, times]))
     found = [
-        Law(
-            f"disturbance:{tag}",
-            [np.log([size, time * step]) for time in TIMES],
-            (np.array([least, math.log(0.5 * step)]), np.array([math.inf, math.log(lasts)])),
-            coloured,
-            lambda x: ColouredDisturbance(math.exp(float(x[0])), math.exp(float(x[1]))),
-        ),
-        Law(
-            f"disturbance:{tag}",
-            [np.log([ratio * unit / math.sqrt(step)]) for ratio in RATIOS],
-            (np.array([least]), endless),
-            walk,
-            walked,
-        ),
+        Law(added, ColouredDisturbance, None, (coloured[0], coloured[1]), step),
+        Law(added, RandomWalkDisturbance, None, _ends(walked), step),
     ]
     for j, valve in enumerate(model.valve_names):
-        if not base.run.responses.reaches(output, j):
-            continue
-        a, b, c = _path(base, output, j)
-        gain = _reach(a, b, c, base.run.runs.longest)
-        found.append(
-            Law(
-                f"load:{valve}",
-                [np.log([ratio * unit / gain / math.sqrt(step)]) for ratio in (0.3, 3.0)],
-                (np.array([least - math.log(gain)]), endless),
-                functools.partial(_walk_through, a, b, c, step),
-                walked,
-            )
-        )
+        if base.run.responses.reaches(output, j):
+            path = _path(base, output, j)
+            ends = _ends(walked / _reach(path, base.run.runs.longest))
+            found.append(Law(f"load:{valve}", RandomWalkDisturbance, path, ends, step))
     return found
 
 
-def _walk_through(a: FloatArray, b: FloatArray, c: FloatArray, step: float, x: FloatArray) -> Block:
-    """Return a random walk that enters a process, by the logarithm of its step."""
-    count = len(a)
-    whole, spread = np.zeros((count + 1, count + 1)), np.zeros((count + 1, count + 1))
-    whole[:count, :count], whole[:count, count], whole[count, count] = a, b, 1.0
-    spread[count, count] = math.exp(2.0 * float(x[0])) * step
-    return Block(whole, spread, np.append(c, 0.0), np.zeros_like(whole))
+def _ends(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return np.log(sizes[:1]), np.log(sizes[1:])
 
 
-def _path(base: Baseline, output: int, valve: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _path(base: Baseline, output: int, valve: int) -> Path:
     """Return A, b, c from a valve to an output; dead time delays a walk, which stays a walk."""
     process, name = base.run.model.process, base.run.model.valve_names[valve]
     equations = arx_equations(process)
@@ -136,8 +102,9 @@ def _path(base: Baseline, output: int, valve: int) -> tuple[FloatArray, FloatArr
     return companion(ar), b, np.eye(count)[0]
 
 
-def _reach(a: FloatArray, b: FloatArray, c: FloatArray, rows: slice) -> float:
+def _reach(path: Path, rows: slice) -> float:
     """Return how far a step moves an output within a record, in the mean."""
+    a, b, c = path
     seen = responses(a, c[None], itertools.repeat(b[:, None], rows.stop - rows.start))
     return max(float(np.sqrt(np.mean(seen**2))), 1e-9)
 
@@ -147,8 +114,8 @@ def declared_block(base: Baseline, output: int, declared: DeclaredNoise) -> Bloc
     variance = declared.std**2
     rounding = base.run.runs.lattices[output] ** 2 / 12.0
     count = len(declared.ar)
-    if not count:
-        return white_block(variance + rounding)
     q = np.zeros((count, count))
+    if not count:
+        return Block(q, q, np.zeros(0), variance + rounding)
     q[0, 0] = variance
-    return Block(companion(declared.ar), q, np.eye(count)[0], q, FLOOR * variance + rounding)
+    return Block(companion(declared.ar), q, np.eye(count)[0], FLOOR * variance + rounding)
