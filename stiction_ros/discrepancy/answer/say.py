@@ -17,7 +17,6 @@ from stiction_ros.discrepancy.measures import MAJORITY
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray, about
 
-LEFT = 0.4  # of what is explained: what may stay unexplained beside it
 ACCURATE = 0.01  # of the span of OP: a stem that near follows it
 
 
@@ -43,7 +42,7 @@ def overall(
     """
     last = looks[-1].decision
     left = max(fit.evidence for fit in looks[-1].scores.fits)
-    unknown = last.verdict is GapVerdict.UNKNOWN and left > LEFT * gained
+    unknown = last.verdict is GapVerdict.UNKNOWN and left > MAJORITY * gained
     if effects:
         alternatives = tuple(dict.fromkeys(n for each in effects for n in each.alternatives))
         return (GapVerdict.UNKNOWN if unknown else effects[0].verdict), alternatives

@@ -16,7 +16,6 @@ from stiction_ros.effects import Backlash, FloatArray, Stiction, about
 JUMP_ABSENT = 5.0
 """BIC by which there is no jump: of the 7 that its figure costs in 1500 samples chance gains 2."""
 OFTEN = 8  # departures from rest that must show no jump before it is said to be absent
-CLEAR = 40.0  # BIC below which friction is told, but not of which kind
 FRICTION = "friction"  # families of effects
 LAGS = "lag"
 DOUBTFUL = 3.0  # standard deviations
@@ -217,7 +216,7 @@ def friction_kind(
     if not jumping or not plain:
         return best, ()
     jump = jumping[0].evidence - plain[0].evidence
-    if best.evidence < CLEAR:  # too little to tell whether there is a jump
+    if best.evidence < MARGIN + SURE:  # too little to tell whether there is a jump
         other = jumping[0] if best.candidate.effect == Backlash.effect else plain[0]
         return best, (other.candidate.key,)
     if jump > MARGIN and jumping[0].candidate.leaps(jumping[0].point):

@@ -12,7 +12,7 @@ from stiction_ros.discrepancy.likelihood.declared_noise import LONGEST, declared
 from stiction_ros.effects import FloatArray
 from stiction_ros.texts import spoken
 
-LARGER = 1.25  # times the declared standard deviation, beyond which they disagree
+LARGER = 1.25  # times the declared or the usual standard deviation: more is another noise
 SOME_STEPS = 3.0  # of the rounding
 
 

@@ -15,14 +15,14 @@ from stiction_ros.discrepancy.gap.noise_laws import FLOOR, Block, Law, declared_
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
 from stiction_ros.discrepancy.likelihood.noise import SURPRISE
 from stiction_ros.discrepancy.likelihood.state_noise import left_by_columns, steady_gain
-from stiction_ros.discrepancy.measures import MARGIN, NORMAL
+from stiction_ros.discrepancy.measures import MARGIN, NORMAL, SURE
 from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
 from stiction_ros.signals.autoregression import TINY
 
 POINTS, LATTICES = 13, 4  # of a lattice along each figure, and how many are laid
 FALLS = 4.0  # by which the bound falls from lattice to lattice
 CLEAR = 0.3  # by which the logarithm of a figure has to be inside of its range
-NO_LAW = 30.0  # BIC by which a law may miss an autoregression and still be its name
+NO_LAW = MARGIN + SURE  # BIC by which a law may miss an autoregression and still be its name
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.gap.measure import LARGER
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
 from stiction_ros.discrepancy.measures import MAJORITY, MARGIN
 from stiction_ros.discrepancy.simulation.free_run import FEWEST
@@ -14,7 +15,6 @@ from stiction_ros.texts import spoken
 
 KNOTS = 60
 WEIGHTS = 10.0 ** np.arange(-3.0, 4.0)
-CLEAR = 1.5  # times the usual size of innovations
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,7 +63,7 @@ def _at_moments(base: Baseline, output: int, name: str) -> list[str]:
         rows = moments & scored
         if 5 <= rows.sum() < 0.5 * scored.sum():
             ratio = float(np.sqrt(np.mean(squares[rows]) / np.mean(squares[scored & ~rows])))
-            if ratio > CLEAR:
+            if ratio > LARGER:
                 found.append(f"{name}: innovations are {ratio:.1f} times larger {what}")
     moment, ratio = _change(noise.residual, scored)
     if ratio > MAJORITY:

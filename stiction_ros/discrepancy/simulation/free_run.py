@@ -23,7 +23,6 @@ BLOCKS = 24
 PHASES = (0, 1, 3)
 """Of the held-out blocks, record by record. By each of them the first block of a record is fitted:
 nothing else holds its state at the start."""
-SHORTEST_BLOCK = 20
 FEWEST = 40  # samples of the longest record
 MOVE_ON = ("stiction", "backlash", "slew", "lag", "pole")
 """Effects with which what enters a process goes on moving between two samples."""
@@ -79,7 +78,7 @@ class Runs:
     def kept_back(self, record: int, phase: int) -> BoolArray:
         """Return which rows of one record are kept back, shape (n,)."""
         rows = self.slices[record]
-        size = max(len(self) // BLOCKS, SHORTEST_BLOCK)
+        size = max(len(self) // BLOCKS, FEWEST // 2)
         place = np.arange(rows.stop - rows.start) // size + phase
         return np.asarray(place % HELD_SHARE == HELD_SHARE - 2)
 

@@ -13,14 +13,13 @@ from stiction_ros.discrepancy.decision.decide import (
 )
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.discrepancy.measures import TRIED
+from stiction_ros.discrepancy.measures import MARGIN, SURE, TRIED
 from stiction_ros.discrepancy.steps.look import look_on, scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import best_whole, mended
 from stiction_ros.effects import Backlash, StepDisturbance, about
 
 CANCEL = 0.25  # of the larger one, that two opposite steps may leave
-NEAR = 40.0  # evidence, by which a rival may be behind beside figures that were fitted without it
 Keys = tuple[tuple[str, str], ...]  # places and effects
 
 
@@ -128,7 +127,7 @@ def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]
         for f in sorted(fits, key=lambda f: -f.evidence)
         if f.candidate.inside
         and f.candidate.key not in known
-        and f.evidence > max(mine - NEAR, 0.0)
+        and f.evidence > max(mine - MARGIN - SURE, 0.0)
         and confirmed(f)
         and large_enough(f)
         and not others.now.tells(f)
