@@ -154,7 +154,7 @@ def _look(found: Discrepancy, look: Look, k: int) -> list[str]:
     return [
         f"<h2>Look {k + 1}: where the gap is</h2>",
         where or "<p>At no particular time or place.</p>",
-        _tracks(found, look),
+        _track(found, look),
         f"<h2>Look {k + 1}: the candidates</h2>",
         f"<p>{text(said)}; {text(say.plain(after))}.</p>",
         f"<p class='soft'>{CANDIDATES}</p>",
@@ -205,11 +205,11 @@ def _before_and_after(found: Discrepancy) -> str:
     return "".join(figures)
 
 
-def _tracks(found: Discrepancy, look: Look) -> str:
+def _track(found: Discrepancy, look: Look) -> str:
     """Return the disturbance that would close the gap at the most telling place."""
-    if not look.where.tracks or look.where.tracks[0].gain <= 0.0:
+    track = look.where.track
+    if track is None or track.gain <= 0.0:
         return ""
-    track = look.where.tracks[0]
     place, curve = say.plain(track.place), Curve("disturbance", "free", track.wave)
     time = np.arange(float(len(found.runs))) * found.runs.sample_time
     return over_time(

@@ -31,12 +31,12 @@ class Where:
     """Where the gap of one model is."""
 
     sentences: tuple[str, ...]  # for people
-    tracks: tuple[Track, ...]  # one per place, the one that gains most first
+    track: Track | None  # at the place where it gains most; None in a record that is too short
 
 
 def locate(base: Baseline) -> Where:
     """Return where the gap of the current model is."""
-    tracks = sorted(_tracks(base), key=lambda track: -track.gain)
+    track = max(_tracks(base), key=lambda track: track.gain, default=None)
     sentences: list[str] = []
     for i, name in enumerate(base.run.model.outputs):
         sentences += _at_moments(base, i, name)
@@ -45,9 +45,9 @@ def locate(base: Baseline) -> Where:
             sentences.append(
                 f"{name}: {100 * share:.0f} % of the gap has a period of {spoken(period)}"
             )
-    if tracks and tracks[0].gain > MARGIN:
-        sentences.append(f"a slow disturbance at {tracks[0].place} would close most of the gap")
-    return Where(tuple(sentences), tuple(tracks))
+    if track is not None and track.gain > MARGIN:
+        sentences.append(f"a slow disturbance at {track.place} would close most of the gap")
+    return Where(tuple(sentences), track)
 
 
 def _at_moments(base: Baseline, output: int, name: str) -> list[str]:
