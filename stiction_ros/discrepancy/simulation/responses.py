@@ -7,7 +7,7 @@ import numpy as np
 from stiction_ros.compiled import compiled
 from stiction_ros.deferred import lfilter
 from stiction_ros.effects import Filter, FloatArray
-from stiction_ros.processes import AlteredProcess, ArxProcess, LinearModel, Process, StirredTank
+from stiction_ros.processes import AlteredProcess, ArxProcess, Process, StirredTank
 
 
 @compiled
@@ -115,7 +115,8 @@ class LinearResponses(Responses):
                 [_numerator(model.a, b, c, den) for b in model.b.T] for c in model.c
             ]
             self.skip = 0
-            self._rests = [_state_starts(model, den, i) for i in range(count)]
+            starts = np.eye(model.order)  # a state at the start is an impulse one sample before
+            self._rests = [[_numerator(model.a, x, c, den)[1:] for x in starts] for c in model.c]
         self._loads = [
             [_numerator(model.a, e, c, denominator) for e in model.e.T]
             for c, denominator in zip(model.c, self._denominators, strict=True)
@@ -273,16 +274,6 @@ def _numerator(
         impulse.append(float(c @ state))
         state = a @ state
     return np.asarray(np.convolve(denominator, impulse)[: len(b) + 1])
-
-
-def _state_starts(model: LinearModel, denominator: FloatArray, output: int) -> list[FloatArray]:
-    """Return the numerators of the responses to each state at the start."""
-    rows, row = [], model.c[output]
-    for _ in range(model.order):
-        rows.append(row)
-        row = row @ model.a
-    responses = np.array(rows).reshape(model.order, model.order)
-    return [np.convolve(denominator, responses[:, i])[: model.order] for i in range(model.order)]
 
 
 def _of_filter(entry: Filter) -> tuple[FloatArray, FloatArray]:
