@@ -70,20 +70,6 @@ def not_considered(
     return tuple(found)
 
 
-def left_out(outputs: Sequence[str], alone: Sequence[int]) -> tuple[NotConsidered, ...]:
-    """Return what the gate took from the records before any effect was searched in them.
-
-    Args:
-        outputs: tags.
-        alone: per output the single samples far off both neighbours.
-    """
-    return tuple(
-        NotConsidered("sensor", "spikes", None, ALONE.format(name=name, count=count))
-        for name, count in zip(outputs, alone, strict=False)
-        if count
-    )
-
-
 def _by_other_means(kind: type[Behaviour], controller: ControllerCheck) -> bool:
     """Tell whether the gate, the check of the controller or the list of the untestable has it."""
     if kind in (Tuning, TimeShift):
@@ -187,7 +173,9 @@ class Discrepancy:
             for entry in not_considered(tried, self.controller)
             if (entry.place, entry.effect) not in named or entry.law is not None
         )
-        return (*listed, *left_out(self.model_before.outputs, self.gate.alone))
+        alone = zip(self.model_before.outputs, self.gate.alone, strict=True)
+        said = [ALONE.format(name=name, count=count) for name, count in alone if count]
+        return (*listed, *(NotConsidered("sensor", "spikes", None, each) for each in said))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``gap --json``."""
