@@ -64,10 +64,8 @@ def closing(task: Task, looked: State) -> Discrepancy:
     gained = state.before.score - base.score + sum(noise.delta_bic for noise in louder)
     verdict, alternatives = overall(shown, answers, state.looks, state.testable, gained)
     model = state.now.bare
-    for named, added in zip(found, state.now.effects, strict=True):
-        model = model.with_effect(added.place, added.behaviour, **_provenance(task, named))
-    for noise in louder:
-        model = model.with_effect(noise.place, noise.behaviour, **_provenance(task, noise))
+    for named in answers:
+        model = model.with_effect(named.place, named.behaviour, **_provenance(task, named))
     noises = check_noise(base)
     kept = {e.fit.candidate.key for e in state.now.effects}
     no_names = [
@@ -189,18 +187,16 @@ def _intervals(
         beside: per output what these, and what of the process was changed, would do by other
             figures, shape (N, q).
     """
-    effect = state.now.effects[k]
-    if task.options.quick:
+    effect, options = state.now.effects[k], task.options
+    if options.quick:
         return without_its_jump(likelihood_intervals(base, effect.fit, beside), effect)
-    done = task.options.most_effects / (task.options.most_effects + 1)
+    done = options.most_effects / (options.most_effects + 1)
     part = (1.0 - done) / len(state.now.effects)
 
     def report(share: float) -> None:
         task.report(done + (k + share) * part)
 
-    found = bootstrap_intervals(
-        base, effect.fit, task.options.resamples, task.random, report, beside
-    )
+    found = bootstrap_intervals(base, effect.fit, options.resamples, task.random, report, beside)
     return without_its_jump(found, effect)
 
 

@@ -39,7 +39,6 @@ class State:
     before: Baseline  # of the free run without what was added
     now: Explanation  # what is in the model
     looks: tuple[Look, ...] = ()  # the rounds so far
-    opened: int = 0  # the first look at the process as it is now
     testable: tuple[Testable, ...] = ()  # what the last look could have seen
     # what is believed without the first effect that was added in doubt; None where none was
     doubted: "State | None" = None

@@ -98,7 +98,7 @@ def mended(task: Task, state: State) -> State | None:
         return None
     # Where no effect was in the model, the looks have to find it.
     other = found if added else found.holding(())
-    return dataclasses.replace(state, now=other, opened=len(state.looks))
+    return dataclasses.replace(state, now=other)
 
 
 def process_first(task: Task, state: State, scores: Scores) -> State | None:
@@ -114,17 +114,14 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
     if not (slower or suspicious(state.now.base)):
         return None
     found = with_process(task, state, state.now.effects)
-    inside = [fit for fit in scores.fits if fit.candidate.inside and fit.evidence > 0.0]
-    best = max(inside, key=lambda fit: fit.evidence, default=None)
-    gained = 0.0 if best is None else best.evidence
     if found is None:
         return None
+    inside = [fit for fit in scores.fits if fit.candidate.inside and fit.evidence > 0.0]
+    gained = max((fit.evidence for fit in inside), default=0.0)
     explained = state.now.worth(margin) - found.worth(margin)
-    if explained <= gained:
-        return None
-    # One figure alone is what an effect says.
-    rivals = [fit.candidate.effect for fit in inside if fit.evidence > explained - margin]
-    if best is not None and same_thing(found.changes, [best.candidate.effect, *rivals]):
+    near = min(gained, explained - margin)
+    rivals = [fit.candidate.effect for fit in inside if fit.evidence >= near]
+    if explained <= gained or same_thing(found.changes, rivals):
         return None
     return dataclasses.replace(state, now=found)
 
@@ -142,11 +139,10 @@ def changed_again(task: Task, state: State, effects: Sequence[AddedEffect]) -> E
 
 
 def singles(state: State) -> list[AddedEffect]:
-    """Return the effects that explain most alone, the process as it is now."""
-    look = state.looks[min(state.opened, len(state.looks) - 1)]
+    """Return the effects that explained most alone in the first look."""
     return [
         AddedEffect(fit, fit.candidate.twins)
-        for fit in sorted(look.scores.fits, key=lambda fit: -fit.evidence)
+        for fit in sorted(state.looks[0].scores.fits, key=lambda fit: -fit.evidence)
         if fit.candidate.inside and fit.evidence > 0.0 and large_enough(fit)
     ]
 
