@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.declared_noise import LONGEST, declared_noise, seen_noise
+from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise, seen_noise
 from stiction_ros.effects import FloatArray
-from stiction_ros.texts import spoken
 
 LARGER = 1.25  # times the declared or the usual standard deviation: more is another noise
 SOME_STEPS = 3.0  # of the rounding
@@ -123,7 +122,7 @@ class OutputNoise:
     expected: float
     found: float  # of those that the answer leaves, under the declared form
     disagrees: bool  # whether they are larger than declared, or depend on each other
-    memory: int  # samples after which the strongest dependence comes; 0 where there is none
+    dependent: bool  # whether they depend on each other
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``gap --json``; a missing declaration is null."""
@@ -144,14 +143,13 @@ def check_noise(base: Baseline) -> tuple[OutputNoise, ...]:
     ):
         fit, quantum = base.noise[i], runs.quanta[i]
         if declared is None:
-            found.append(OutputNoise(name, math.nan, math.nan, fit.innovation_std, False, 0))
+            found.append(OutputNoise(name, math.nan, math.nan, fit.innovation_std, False, False))
             continue
         shown = max(seen[i], key=lambda form: form.std)
         expected = math.sqrt(shown.std**2 + (0.0 if len(shown.ar) else quantum**2 / 12.0))
-        memory = _memory(base, i) if fit.enlarged else 0
         disagrees = fit.enlarged or fit.innovation_std > LARGER * expected
         found.append(
-            OutputNoise(name, declared.std, expected, fit.innovation_std, disagrees, memory)
+            OutputNoise(name, declared.std, expected, fit.innovation_std, disagrees, fit.enlarged)
         )
     return tuple(found)
 
@@ -167,19 +165,7 @@ def spans_steps(base: Baseline, output: int) -> bool:
     return left >= SOME_STEPS * base.run.runs.quanta[output]
 
 
-def _memory(base: Baseline, output: int) -> int:
-    """Return the lag at which what is left depends on itself most."""
-    rows = base.blocks[output].scored
-    values = np.where(rows, base.noise[output].residual, 0.0)
-    values = values - values[rows].mean() * rows
-    whole = float(values @ values)
-    if whole <= 0.0:
-        return 0
-    shares = [float(values[lag:] @ values[:-lag]) / whole for lag in range(1, LONGEST + 1)]
-    return 1 + int(np.argmax(np.abs(shares)))
-
-
-def noise_sentences(noises: tuple[OutputNoise, ...], sample_time: float) -> list[str]:
+def noise_sentences(noises: tuple[OutputNoise, ...]) -> list[str]:
     """Return where and how far the noise is another than declared, for people."""
     said = []
     for each in noises:
@@ -187,7 +173,7 @@ def noise_sentences(noises: tuple[OutputNoise, ...], sample_time: float) -> list
             continue
         size = f"{each.name}: innovations of {each.found:.3g} where the model declares "
         size += f"{each.declared:.3g}"
-        if each.memory:
-            size += f", and they depend on each other over {spoken(each.memory * sample_time)}"
+        if each.dependent:
+            size += ", and they depend on each other"
         said.append(size)
     return said

@@ -123,9 +123,9 @@ def _where(
         first = state.looks[0]
         found += stem_sentences(state.before.run, first.scores.fits)
         found += () if first.kept else first.where.sentences
-    found += noise_sentences(check_noise(state.before), task.runs.sample_time)
+    found += noise_sentences(check_noise(state.before))
     if state.now.effects:
-        left = noise_sentences(noises, task.runs.sample_time)
+        left = noise_sentences(noises)
         found += [f"beside what was found, {sentence}" for sentence in left]
     last = state.looks[-1].decision
     if last.verdict is GapVerdict.UNKNOWN:

@@ -145,7 +145,7 @@ def test_a_lag_that_moves_on_between_samples_is_told_from_another_process(seed: 
 def test_a_curve_is_stepped_with_the_process_that_stands_in_for_it() -> None:
     answer = answered(302, given="off")
     assert names(answer) == [("valve:V1", "characteristic")]
-    assert not any(noise.memory for noise in answer.noise)
+    assert not any(noise.dependent for noise in answer.noise)
 
 
 @pytest.mark.trial
