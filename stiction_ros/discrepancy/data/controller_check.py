@@ -149,14 +149,14 @@ def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
     Without a recorded tuning, gain and integral time are fitted: then only the clock can be
     checked. Samples at which OP rests at a limit are left out.
     """
-    laws = [_fit(model, runs, shift) for shift in range(LONGEST_SHIFT + 1)]
+    laws = [_law(model, runs, shift) for shift in range(LONGEST_SHIFT + 1)]
     scans = _scans(model, runs, laws[0])
     if scans is not None:
         return ControllerCheck(ControllerStatus.SAME, None, laws[0].left, False, scans)
     best = min(range(len(laws)), key=lambda shift: laws[shift].left * (1.0 + 1e-3 * shift))
     recorded = model.controller
-    own = math.inf if recorded is None else _left(model, runs, recorded)
-    as_well = own <= 2.0 * laws[0].left
+    own = math.inf if recorded is None else _law(model, runs, tuning=recorded).left
+    as_well = math.isfinite(own) and own <= 2.0 * laws[0].left
     if (
         recorded is not None
         and best == 0
@@ -239,11 +239,15 @@ def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, F
     return np.concatenate(moves), np.vstack(columns)
 
 
-def _fit(model: LoopModel, runs: Runs, shift: int) -> _Law:
+def _law(model: LoopModel, runs: Runs, shift: int = 0, tuning: PiTuning | None = None) -> _Law:
+    """Return a recorded law, or without one that of least squares; inf is left where OP rests."""
     moves, columns = _regression(model, runs, shift)
-    if len(moves) < 10 or not np.any(moves):
-        return _Law(0.0, 1.0, 1.0, len(moves))
-    gain, integral = np.linalg.lstsq(columns, moves, rcond=None)[0].tolist()
+    if not np.any(moves) or (tuning is None and len(moves) < 10):
+        return _Law(0.0, 1.0, math.inf, len(moves))
+    if tuning is None:
+        gain, integral = np.linalg.lstsq(columns, moves, rcond=None)[0].tolist()
+    else:
+        gain, integral = tuning.gain, tuning.gain / tuning.integral_time
     left = moves - columns @ np.array([gain, integral])
     share = float(np.linalg.norm(left) / np.linalg.norm(moves))
     time = gain / integral if integral != 0.0 and gain / integral > 0.0 else 1e9
@@ -257,12 +261,3 @@ def _rounding(runs: Runs, law: _Law) -> float:
     now = law.gain * (1.0 + runs.sample_time / law.integral_time)
     variance = ((now**2 + law.gain**2) * pv**2 + 2.0 * op**2) / 12.0
     return math.sqrt(variance) / law.usual if law.usual > 0.0 else 0.0
-
-
-def _left(model: LoopModel, runs: Runs, tuning: PiTuning) -> float:
-    """Return the share of the moves of OP that a law leaves."""
-    moves, columns = _regression(model, runs, 0)
-    if not np.any(moves):
-        return math.inf
-    left = moves - columns @ np.array([tuning.gain, tuning.gain / tuning.integral_time])
-    return float(np.linalg.norm(left) / np.linalg.norm(moves))
