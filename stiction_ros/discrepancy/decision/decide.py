@@ -2,6 +2,7 @@
 
 import dataclasses
 import enum
+import itertools
 import math
 from collections.abc import Callable, Sequence
 
@@ -108,10 +109,9 @@ def decide(
         and large_enough(f)
         and not _same_family(f, best)
     ]
-    others = [f.candidate.key for f in rivals]
-    names = list(dict.fromkeys([*family, *best.candidate.twins, *others]))
-    for rival in rivals:
-        names += [twin for twin in rival.candidate.twins if twin not in names]
+    own, twins = [*family, *best.candidate.twins], [f.candidate.twins for f in rivals]
+    own += [f.candidate.key for f in rivals]
+    names = tuple(dict.fromkeys(itertools.chain(own, *twins)))
     if names:
         reason = "OP and PV do not tell them apart"
         one_family = all(  # or the same effect at another place explains all, as a sine's load does
@@ -119,7 +119,7 @@ def decide(
             or (f.candidate.effect == best.candidate.effect and _as_much(f, best))
             for f in rivals
         )
-        return Decision(GapVerdict.AMBIGUOUS, best, tuple(names), one_family, reason)
+        return Decision(GapVerdict.AMBIGUOUS, best, names, one_family, reason)
     return Decision(GapVerdict.NAMED, best, (), True, "it beats no effect and its rivals")
 
 

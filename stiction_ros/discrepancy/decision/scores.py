@@ -1,7 +1,7 @@
 """Step 4: every candidate scored against the current model, which stays as it is."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -95,7 +95,7 @@ class Testable:
 
 
 def testable_effects(
-    base: Baseline, candidates: list[Candidate], margin: float
+    base: Baseline, candidates: Sequence[Candidate], margin: float
 ) -> tuple[Testable, ...]:
     """Return for every candidate of the catalogue what it would gain at a size that matters."""
     found: dict[tuple[str, str], Testable] = {}

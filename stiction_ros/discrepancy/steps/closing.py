@@ -22,6 +22,7 @@ from stiction_ros.discrepancy.answer.say import (
     stem_sentences,
 )
 from stiction_ros.discrepancy.decision.decide import GapVerdict, on_the_way, verdict_of
+from stiction_ros.discrepancy.decision.scores import testable_effects
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.uncertainty import (
     Intervals,
@@ -62,7 +63,9 @@ def closing(task: Task, looked: State) -> Discrepancy:
     shown, answers = [of_data(finding) for finding in task.data], [*found, *louder]
     effects = [*shown, *answers]
     gained = state.before.score - base.score + sum(noise.delta_bic for noise in louder)
-    verdict, alternatives = overall(shown, answers, state.looks, state.testable, gained)
+    last = state.looks[-1].scores
+    testable = testable_effects(last.base, last.candidates, task.options.margin)
+    verdict, alternatives = overall(shown, answers, state.looks, testable, gained)
     model = state.now.bare
     for named in answers:
         model = model.with_effect(named.place, named.behaviour, **_provenance(task, named))
@@ -83,11 +86,9 @@ def closing(task: Task, looked: State) -> Discrepancy:
         verdict=verdict,
         effects=tuple(effects),
         alternatives=alternatives,
-        experiment=experiment_for(verdict, effects, alternatives, state.testable),
+        experiment=experiment_for(verdict, effects, alternatives, testable),
         where=_where(task, state, noises, no_names, verdict),
-        untestable=tuple(
-            t for t in state.testable if not t.testable and (t.place, t.effect) not in told
-        ),
+        untestable=tuple(t for t in testable if not t.testable and (t.place, t.effect) not in told),
         noise=noises,
         process_changes=state.now.changes,
         before=before,

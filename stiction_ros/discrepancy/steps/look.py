@@ -22,12 +22,7 @@ from stiction_ros.discrepancy.decision.explanation import (
     left_open,
     refit_together,
 )
-from stiction_ros.discrepancy.decision.scores import (
-    Scores,
-    all_candidates,
-    score_candidates,
-    testable_effects,
-)
+from stiction_ros.discrepancy.decision.scores import Scores, all_candidates, score_candidates
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.gap.where import locate
@@ -45,7 +40,6 @@ def look_on(task: Task, state: State) -> State:
     is not yet in the model may be why. Where nothing more is found, or all together leaves more
     than the declared noise, it is taken back.
     """
-    state = dataclasses.replace(state, testable=())
     for k in range(len(state.now.effects), task.options.most_effects):
         state = look(task, state, k)
         if not state.looks[-1].kept:
@@ -66,8 +60,7 @@ def look(task: Task, state: State, k: int) -> State:
     grown, reason = _extended(task, state, decision)
     kept = grown is not None
     own = Look(scores, decision, locate(scores.base), kept, reason)
-    testable = testable_effects(scores.base, list(scores.candidates), task.options.margin)
-    seen = dataclasses.replace(state, testable=testable, looks=(*state.looks, own))
+    seen = dataclasses.replace(state, looks=(*state.looks, own))
     if grown is None:
         return seen
     given_up = dataclasses.replace(own, kept=False, reason=decision.reason)

@@ -9,7 +9,7 @@ from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.data.controller_check import ControllerCheck
 from stiction_ros.discrepancy.data.gate import DataFinding, Gate
 from stiction_ros.discrepancy.decision.explanation import AddedEffect, Explanation
-from stiction_ros.discrepancy.decision.scores import Progress, Testable
+from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap_options import GapOptions
 from stiction_ros.discrepancy.simulation.free_run import Runs
@@ -39,7 +39,6 @@ class State:
     before: Baseline  # of the free run without what was added
     now: Explanation  # what is in the model
     looks: tuple[Look, ...] = ()  # the rounds so far
-    testable: tuple[Testable, ...] = ()  # what the last look could have seen
     # what is believed without the first effect that was added in doubt; None where none was
     doubted: "State | None" = None
 
