@@ -12,7 +12,6 @@ from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise, s
 from stiction_ros.effects import FloatArray
 
 LARGER = 1.25  # times the declared or the usual standard deviation: more is another noise
-SOME_STEPS = 3.0  # of the rounding
 
 
 @dataclasses.dataclass(frozen=True)
@@ -152,17 +151,6 @@ def check_noise(base: Baseline) -> tuple[OutputNoise, ...]:
             OutputNoise(name, declared.std, expected, fit.innovation_std, disagrees, fit.enlarged)
         )
     return tuple(found)
-
-
-def spans_steps(base: Baseline, output: int) -> bool:
-    """Tell whether what an answer leaves of an output spans some steps of its rounding.
-
-    Rounding of a slow signal is no white noise: within a few steps no law of the noise is told,
-    and none stands against an effect.
-    """
-    rows = base.blocks[output].train
-    left = float(np.std(base.noise[output].residual[rows]))
-    return left >= SOME_STEPS * base.run.runs.quanta[output]
 
 
 def noise_sentences(noises: tuple[OutputNoise, ...]) -> list[str]:

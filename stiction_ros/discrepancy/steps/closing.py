@@ -36,7 +36,6 @@ from stiction_ros.discrepancy.gap.measure import (
     closed_share,
     free_run_gap,
     noise_sentences,
-    spans_steps,
 )
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
@@ -47,6 +46,7 @@ from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.effects import FloatArray
 
 A_ROW = 0.1  # of −2 log likelihood, that noise gains beside an effect: a twentieth of its σ
+SOME_STEPS = 3.0  # of the rounding, that a noise which has a law has to span
 MATTERS = 0.2  # of the gap, that an effect has to close by itself, and a noise that is left to be
 
 
@@ -241,15 +241,15 @@ def _matters(state: State, output: int) -> bool:
     """Tell whether what is left of an output is large enough to be an effect.
 
     A model of the field is never exact: beside a large effect it leaves a little of its own.
+    Rounding of a slow signal is no white noise: within a few steps no law of the noise is told.
     """
     now = state.now
     rows = now.base.blocks[output].train
     before, after = (
         float(np.std(base.noise[output].residual[rows])) for base in (state.before, now.base)
     )
-    if not spans_steps(now.base, output):
-        return False
-    return not (now.effects or now.changes) or after > MATTERS * before
+    alone = not (now.effects or now.changes)
+    return after >= SOME_STEPS * now.runs.quanta[output] and (alone or after > MATTERS * before)
 
 
 def _provenance(task: Task, effect: FoundEffect) -> dict[str, object]:
