@@ -12,7 +12,7 @@ from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.measures import MAJORITY, MARGIN, SURE
 from stiction_ros.discrepancy.simulation.free_run import HELD_SHARE, FreeRun
-from stiction_ros.effects import Backlash, FloatArray, Stiction, about
+from stiction_ros.effects import Backlash, Stiction, about
 
 JUMP_ABSENT = 5.0
 """BIC by which there is no jump: of the 7 that its figure costs in 1500 samples chance gains 2."""
@@ -228,17 +228,25 @@ def friction_kind(
     return first, (second.candidate.key,)
 
 
+def left_of_stem(run: FreeRun, fit: CandidateFit) -> float:
+    """Return the share of a stem's squared distance from the measured one that a fit leaves.
+
+    1 of what is no effect of a valve, and where no stem is recorded.
+    """
+    candidate = fit.candidate
+    if not isinstance(candidate, ValveCandidate):
+        return 1.0
+    measured = run.runs.stem(run.model.valve_names[candidate.valve])
+    stems = candidate.stems(run, fit.point[None, :], from_measured=True)[:, 0]
+    before, after = (
+        float(np.nansum((each - measured) ** 2)) for each in (run.stems[:, candidate.valve], stems)
+    )
+    return after / before if before > 0.0 else 1.0 + after
+
+
 def not_contradicted(run: FreeRun, fits: Sequence[CandidateFit]) -> list[CandidateFit]:
     """Return the fits but for those whose stem is further from the measured one than now."""
-    kept = []
-    for fit in fits:
-        if isinstance(fit.candidate, ValveCandidate):
-            valve = fit.candidate.valve
-            stems = fit.candidate.stems(run, fit.point[None, :], from_measured=True)[:, 0]
-            if stem_misfit(run, valve, stems) > stem_misfit(run, valve, run.stems[:, valve]):
-                continue
-        kept.append(fit)
-    return kept
+    return [fit for fit in fits if left_of_stem(run, fit) <= 1.0]
 
 
 def confirmed_by_stem(run: FreeRun, fit: CandidateFit) -> bool:
@@ -246,14 +254,7 @@ def confirmed_by_stem(run: FreeRun, fit: CandidateFit) -> bool:
 
     A stem that is merely late, or smoother than OP, comes a little nearer by any bend.
     """
-    candidate = fit.candidate
-    if not isinstance(candidate, ValveCandidate):
-        return False
-    if not run.runs.stems_recorded:
-        return False
-    stems = candidate.stems(run, fit.point[None, :], from_measured=True)[:, 0]
-    now = stem_misfit(run, candidate.valve, run.stems[:, candidate.valve])
-    return stem_misfit(run, candidate.valve, stems) < MAJORITY * now
+    return run.runs.stems_recorded and left_of_stem(run, fit) < MAJORITY
 
 
 def told_by_stem(run: FreeRun, decision: Decision, fits: Sequence[CandidateFit]) -> Decision:
@@ -284,8 +285,3 @@ def told_by_stem(run: FreeRun, decision: Decision, fits: Sequence[CandidateFit])
     reason = decision.reason if others else "the recorded stem tells it from its rivals"
     inseparable = decision.inseparable or not others
     return Decision(verdict, first, others, inseparable, reason)
-
-
-def stem_misfit(run: FreeRun, valve: int, stems: FloatArray) -> float:
-    """Return the sum of squared distances from the measured stems; 0 where none is recorded."""
-    return float(np.nansum((stems - run.runs.stem(run.model.valve_names[valve])) ** 2))
