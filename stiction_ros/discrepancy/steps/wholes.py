@@ -21,8 +21,7 @@ the letter, and what the law misses weighs the more the more it explains."""
 def best_whole(now: Explanation, margin: float) -> Explanation:
     """Return the best of all subsets of what was found, one effect after the other.
 
-    Every further effect has to gain the margin, beside a share of what all gain. A single effect
-    that takes the place of several is in doubt with those that explain as much alone.
+    Every further effect has to gain the margin, beside a share of what all gain.
     """
     added = now.effects
     if not added:
@@ -32,16 +31,7 @@ def best_whole(now: Explanation, margin: float) -> Explanation:
         price += INEXACT * max(tried[1].score - tried[0].score, 0.0)
         for count in range(1, len(added)):
             tried += [now.refitted(part) for part in itertools.combinations(added, count)]
-    best = min(tried, key=lambda each: each.worth(price))
-    if len(best.effects) != 1 or len(added) < 2:
-        return best
-    most = best.worth(margin) + margin
-    close = [each for each in tried if len(each.effects) == 1 and each.worth(margin) < most]
-    (effect,) = best.effects
-    keys = [key for each in close for key in each.effects[0].fit.candidate.keys]
-    names = dict.fromkeys([*effect.alternatives, *keys])
-    others = tuple(name for name in names if name != (effect.place, effect.effect))
-    return dataclasses.replace(best, effects=(dataclasses.replace(effect, alternatives=others),))
+    return min(tried, key=lambda each: each.worth(price))
 
 
 def suspicious(base: Baseline) -> bool:
