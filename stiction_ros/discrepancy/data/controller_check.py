@@ -21,7 +21,6 @@ EXACT = 0.02  # of the moves of OP, that a law may leave which gives them
 ONCE = 5e-3  # of the moves of OP, that a law leaves which scans once
 TWICE = 0.1  # of the moves of OP, that one scan leaves of a law which scans twice
 ROUNDED = 1.2  # times what rounding of the signals leaves
-COARSEST = 0.2  # of the moves of OP: coarser rounding makes the gain seem smaller
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
 FINE = 0.02  # of the span of OP: values that are chosen are rounder than what rounding shows
 FINEST = 1e-4  # of the span of OP: what is finer says nothing
@@ -165,7 +164,7 @@ def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
         known = laws[0].left < EXACT
         return ControllerCheck(ControllerStatus.SAME, None, own, known)
     law = laws[best]
-    if law.left > max(EXACT, ROUNDED * min(_rounding(runs, law), COARSEST)):
+    if law.left > max(EXACT, ROUNDED * _rounding(runs, law)):
         return ControllerCheck(ControllerStatus.UNEXPLAINED, None, law.left, False)
     if recorded is None and best == 0:
         rounded = quantum_of(runs.op[:, 0]) > 0.0

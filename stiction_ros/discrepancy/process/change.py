@@ -15,7 +15,7 @@ from stiction_ros.discrepancy.decision.explanation import (
 )
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.least_squares import left_by
-from stiction_ros.discrepancy.measures import GAUSS_NEWTON, MARGIN, NORMAL, ROUNDING
+from stiction_ros.discrepancy.measures import GAUSS_NEWTON, MARGIN, NEARLY_ALL, NORMAL, ROUNDING
 from stiction_ros.discrepancy.process.slower import GAIN, Changeable
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
@@ -28,7 +28,6 @@ from stiction_ros.signals.autoregression import whiten
 TINY_STEP = 0.02  # of the probes, at which it has settled
 SURE = 2.5  # standard errors by which a figure has to be another than the model's
 PROBE, LARGEST_STEP = 0.02, 0.5  # of an effect's figure: probe of its derivative, longest step
-NEAR = 0.99  # of the largest change, from which on a figure lies on its bound
 Tried = tuple[float, BoolArray, FloatArray, FloatArray, tuple[AddedEffect, ...]]
 
 
@@ -160,8 +159,8 @@ class _Search:
         while self.free.any():
             self._settle()
             sure = np.where(self.free, np.abs(self.values) / self.errors, np.inf)
-            bound = self.values >= NEAR * self.most
-            bound |= (self.values <= NEAR * self.least) & self.gains
+            bound = self.values >= NEARLY_ALL * self.most
+            bound |= (self.values <= NEARLY_ALL * self.least) & self.gains
             bound &= self.free
             sure[bound & self._several()] = 0.0  # two lags that are alike trade off each other
             least = int(np.argmin(sure))

@@ -13,8 +13,7 @@ from stiction_ros.processes import ArxOutput
 from stiction_ros.processes.sampled import pulses
 
 FRACTIONS = 41  # of a sample, at which the dead time's is looked for
-EXACT = 1e-6  # of b, that the continuous plant may miss
-SLIGHT = 1e-5  # of the largest power of s in a numerator, that is rounding
+EXACT = 1e-6  # of b, that the continuous plant may miss, and of a numerator, that is rounding
 
 ComplexArray = NDArray[np.complex128]
 
@@ -119,7 +118,7 @@ def zeros_of(plant: Held) -> ComplexArray:
 
 def _trimmed(numerator: FloatArray) -> FloatArray:
     """Return the numerator without powers of s that count for nothing."""
-    sizes = np.abs(numerator) > SLIGHT * float(np.abs(numerator).max())
+    sizes = np.abs(numerator) > EXACT * float(np.abs(numerator).max())
     return numerator[: int(np.flatnonzero(sizes)[-1]) + 1]
 
 
