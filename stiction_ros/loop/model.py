@@ -147,8 +147,8 @@ class LoopModel:
             _read_disturbance(s, process) for s in top.sections("disturbances", [])
         )
         initial = top.section("initial", {})
-        stem_start = named_numbers(initial, "stem", tags, op0)
-        pv_start = named_numbers(initial, "pv", process.outputs, pv0)
+        stem_start = initial.named_numbers("stem", tags, op0)
+        pv_start = initial.named_numbers("pv", process.outputs, pv0)
         initial.finish()
         controller = None
         if "controller" in top:
@@ -302,30 +302,9 @@ class LoopModel:
         return self.with_valve_effects(dict.fromkeys(self.valve_names, ()))
 
 
-def named_numbers(
-    section: Section, key: str, names: tuple[str, ...], default: FloatArray
-) -> FloatArray:
-    """Return the numbers of a mapping such as ``op: {V1: 50}`` in the order of ``names``."""
-    if key not in section:
-        return default
-    entry = section.section(key)
-    values = np.array([entry.number(n, float(d)) for n, d in zip(names, default, strict=True)])
-    entry.finish()
-    return values
-
-
 def _read_valve(section: Section) -> Valve:
     name = section.text("name")
-    limits = None
-    if "limits" in section:
-        low, high = section.numbers("limits", count=2)
-        if low >= high:
-            raise InputError(
-                f"lower limit {low:g} is not below {high:g}",
-                where=section.at("limits"),
-                fix="write [low, high]",
-            )
-        limits = (float(low), float(high))
+    limits = section.ends("limits") if "limits" in section else None
     effects = read_effects(section, "valve")
     section.finish()
     return Valve(name, limits, effects)

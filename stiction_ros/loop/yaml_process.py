@@ -178,17 +178,8 @@ def read_instruments(section: Section, outputs: tuple[str, ...]) -> tuple[Instru
 
 
 def _read_instrument(entry: Section) -> Instrument:
-    low, high, rate = -math.inf, math.inf, math.inf
-    if "range" in entry:
-        low, high = entry.numbers("range", count=2).tolist()
-        if low >= high:
-            raise InputError(
-                f"lower end {low:g} is not below {high:g}",
-                where=entry.at("range"),
-                fix="write [low, high]",
-            )
-    if "rate_limit" in entry:
-        rate = entry.number("rate_limit", above=0.0)
+    low, high = entry.ends("range") if "range" in entry else (-math.inf, math.inf)
+    rate = entry.number("rate_limit", above=0.0) if "rate_limit" in entry else math.inf
     return Instrument(low, high, rate)
 
 
@@ -233,12 +224,8 @@ def _read_noise(entry: Section) -> processes.Noise:
 def _read_point(
     point: Section, valves: tuple[str, ...], outputs: tuple[str, ...]
 ) -> tuple[FloatArray, FloatArray]:
-    found = []
-    for key, names in (("op", valves), ("pv", outputs)):
-        entry = point.section(key, {})
-        found.append(np.array([entry.number(name, 0.0) for name in names]))
-        entry.finish()
-    return found[0], found[1]
+    stems, pvs = (np.zeros(len(names)) for names in (valves, outputs))
+    return point.named_numbers("op", valves, stems), point.named_numbers("pv", outputs, pvs)
 
 
 def process_of(system: Any, sample_time: float, dead_time: float) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Checked reading of YAML: every wrong key, type or number becomes one clear error."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +136,26 @@ class Section:
                 f"has {len(value)} values, not {count}", where=self.at(key), fix=f"give {count}"
             )
         return np.array([number(v, f"{self.at(key)}[{i}]") for i, v in enumerate(value)])
+
+    def ends(self, key: str) -> tuple[float, float]:
+        """Return the lower and the upper end of a range."""
+        low, high = self.numbers(key, count=2).tolist()
+        if low >= high:
+            raise InputError(
+                f"lower end {low:g} is not below {high:g}",
+                where=self.at(key),
+                fix="write [low, high]",
+            )
+        return low, high
+
+    def named_numbers(self, key: str, names: Sequence[str], default: FloatArray) -> FloatArray:
+        """Return the numbers of a mapping such as ``op: {V1: 50}`` in the order of ``names``."""
+        if key not in self:
+            return default
+        entry = self.section(key)
+        values = [entry.number(n, float(d)) for n, d in zip(names, default, strict=True)]
+        entry.finish()
+        return np.array(values)
 
     def matrix(self, key: str) -> FloatArray:
         """Return a matrix given as a list of rows of equal length."""
