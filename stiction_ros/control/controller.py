@@ -352,9 +352,9 @@ class MpcController:
     def _gap(self, situation: Situation, proposal: Proposal) -> float | None:
         formulation, plan, target = self._formulation, proposal.plan, situation.target
         samples = self.design.gap_samples
-        if not samples or formulation is None or plan is None or target is None or proposal.age:
+        if not samples or formulation is None or plan is None or target is None:
             return None
-        if proposal.status not in (StepStatus.SOLVED, StepStatus.UNREACHABLE, StepStatus.LIMIT):
+        if proposal.status.failed:
             return None
         return formulation.optimality_gap(situation.state, target, situation.last, plan, samples)
 
