@@ -81,12 +81,6 @@ class Tuning:
 UNCHANGED = Tuning()
 
 
-def candidates(friction: bool) -> list[Tuning]:
-    """Return the tunings to try besides the present one, of a valve with friction or without."""
-    pairs = itertools.product(FASTER if friction else SLOWER, TIMES)
-    return [tuning for pair in pairs if (tuning := Tuning(*pair)) != UNCHANGED]
-
-
 def best_tuning(loop: RecordedLoop, draws: Draws) -> Tuning:
     """Return the tuning that helps most on the first draws; unchanged where none does."""
     few = list(range(min(TRIED, len(draws))))
@@ -106,7 +100,8 @@ def calm(friction: bool, peak_of: Callable[[Tuning], float]) -> list[Tuning]:
         peak_of: peak of the sensitivity under a tuning.
     """
     limit = max(SENSITIVE, CALMER * peak_of(UNCHANGED))
-    return [UNCHANGED, *(one for one in candidates(friction) if peak_of(one) <= limit)]
+    tried = itertools.starmap(Tuning, itertools.product(FASTER if friction else SLOWER, TIMES))
+    return [UNCHANGED, *(one for one in tried if one != UNCHANGED and peak_of(one) <= limit)]
 
 
 def most_helpful(runs: Mapping[Tuning, Sequence[Measures | None]]) -> Tuning:
