@@ -4,7 +4,7 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.kernels.delay import DelayRoom, delay_room, pattern_energy
+from stiction_ros.identification.kernels.delay import pattern_energy
 
 ZOOMS = 16
 POINTS = 5
@@ -13,12 +13,7 @@ EXACT_ENOUGH = 1.0  # second difference of the loss from which a parabola is exa
 
 @compiled
 def _loss(
-    products: FloatArray,
-    rights: FloatArray,
-    scales: FloatArray,
-    level: float,
-    room: DelayRoom,
-    delays: IntArray,
+    products: FloatArray, rights: FloatArray, scales: FloatArray, level: float, delays: IntArray
 ) -> float:
     """Return the loss of one pattern over all outputs, and write its delays.
 
@@ -30,7 +25,7 @@ def _loss(
     for p in range(len(products)):
         rest, count = scales[p, 0], scales[p, 1]
         energy = np.empty(int(scales[p, 2]))
-        pattern_energy(products[p], rights[p], level, rest, room, energy)
+        pattern_energy(products[p], rights[p], level, rest, energy)
         best = int(energy.argmin())
         delays[p] = best
         total += count * np.log(energy[best] / count)
@@ -56,7 +51,6 @@ def best_levels(
     lowest, delays = np.empty(size), np.empty((size, outputs), dtype=np.int64)
     at, loss = np.empty(POINTS), np.empty(POINTS)
     now = np.empty((POINTS, outputs), dtype=np.int64)
-    room = delay_room(products.shape[3], products.shape[4])
     for g in range(size):
         low, high = ranges[g]
         step, best, middle, bend = 0.0, 0, 1, 0.0
@@ -64,7 +58,7 @@ def best_levels(
             for i in range(POINTS):
                 if zoom == 0 or i % 2 == 1:
                     at[i] = low + 0.25 * i * (high - low)
-                    loss[i] = _loss(products[g], rights[g], scales, at[i], room, now[i])
+                    loss[i] = _loss(products[g], rights[g], scales, at[i], now[i])
             best = int(loss.argmin())
             middle = min(max(best, 1), POINTS - 2)
             step = max(0.25 * (high - low), 1e-300)

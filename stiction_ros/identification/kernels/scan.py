@@ -6,15 +6,32 @@ summed up from its end, says at every sample what a step there contributes. Prod
 with themselves are sums over moves as well where there is no prefilter, otherwise over samples.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from stiction_ros.compiled import compiled
+from stiction_ros.compiled import compiled, compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.kernels.copies import put
 from stiction_ros.identification.kernels.delay import DEPENDENT, delay_energy
-from stiction_ros.identification.kernels.filter import Window, filtered_products
+from stiction_ros.identification.kernels.row import driven_rows
 
 STEMS = 64  # whose products are kept at a time
+
+
+class Window(NamedTuple):
+    """What of a scan is the same for all signals."""
+
+    samples: int  # samples, first: N and the first sample of the criterion
+    first: int
+    lag: int  # lag, lags: first lag and number of lags
+    lags: int
+    width: int  # n_b, number of lags of one delay
+    # what a step at each sample adds to the products with the projected columns, and in the last
+    # column with the rest, at lag 0, shape (N + lag + lags, q + 1)
+    tails: FloatArray
+    numerator: FloatArray  # numerator, denominator: D and A of the prefilter
+    denominator: FloatArray
 
 
 @compiled
@@ -126,6 +143,67 @@ def _plain_products(
 
 
 @compiled
+def _driving(window: Window, places: IntArray, values: FloatArray, out: FloatArray) -> None:
+    """Write D x of a signal given by its moves, shape (N,)."""
+    before, total = 0.0, 0.0
+    for k in range(len(out)):
+        out[k] = 0.0
+    for i in range(len(places)):
+        step = values[i] - before
+        before = values[i]
+        for d in range(min(len(window.numerator), window.samples - places[i])):
+            out[places[i] + d] += step * window.numerator[d]
+    for k in range(len(out)):
+        total += out[k]
+        out[k] = total
+
+
+@compiled_fused
+def _products(window: Window, x: FloatArray, s: FloatArray, out: FloatArray) -> None:
+    """Add sums over k ≥ first of x[k − l] s[k − l − d] to a block, shape (width, L)."""
+    begin, end, width = window.first - window.lag, window.samples - window.lag, window.width
+    first = np.empty(width)
+    for one in range(0, width, 3):  # three d at a time, at the end the last one repeatedly
+        two, three = min(one + 1, width - 1), min(one + 2, width - 1)
+        a, b, c = 0.0, 0.0, 0.0
+        for k in range(begin, end):
+            now = x[k]
+            a += now * s[k - one]
+            b += now * s[k - two]
+            c += now * s[k - three]
+        first[one], first[two], first[three] = a, b, c
+    for d in range(width):
+        total = first[d]
+        out[d, 0] += total
+        for position in range(1, window.lags - d):
+            before, last = begin - position, end - position
+            gained = x[before] * s[before - d]
+            total = total + (gained - x[last] * s[last - d])
+            out[d, position] += total
+
+
+@compiled
+def _filtered_products(
+    window: Window, offsets: IntArray, places: IntArray, values: FloatArray, out: FloatArray
+) -> None:
+    """Add lagged products of signals through D/A to ``out``, shape (G, pairs, width, L)."""
+    channels = values.shape[1]
+    driving, z = np.empty((2, window.samples)), np.empty((2, window.samples))
+    each = len(z) // channels  # signals at a time, as the rows wait for their last values
+    for group in range(0, len(out), each):
+        rows = channels * min(each, len(out) - group)
+        for row in range(rows):
+            g, c = group + row // channels, row % channels
+            part = slice(offsets[g], offsets[g + 1])
+            _driving(window, places[part], values[part, c], driving[row])
+        driven_rows(window.denominator, driving, 0, rows, z)
+        for row in range(rows):
+            g, c = group + row // channels, row % channels
+            for other in range(channels):
+                _products(window, z[row], z[row - c + other], out[g, c + other])
+
+
+@compiled
 def without_projections(products: FloatArray, one: FloatArray, two: FloatArray) -> None:
     """Subtract Σ_q one[l, q] two[l + d, q] from products[d, l], in place."""
     lags, columns = one.shape[0], one.shape[1] - 1
@@ -155,7 +233,7 @@ def step_products(
     room = np.zeros((channels, window.samples))
     plain = len(window.numerator) == 1 and len(window.denominator) == 1
     if not plain:
-        filtered_products(window, offsets, places, values, out)
+        _filtered_products(window, offsets, places, values, out)
     for g in range(size):
         part = slice(offsets[g], offsets[g + 1])
         if plain:

@@ -9,9 +9,13 @@ n_b × n_b systems built from lagged correlations.
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.kernels.filter import Window
 from stiction_ros.identification.kernels.row import through
-from stiction_ros.identification.kernels.scan import least_energy, orthonormal, step_products
+from stiction_ros.identification.kernels.scan import (
+    Window,
+    least_energy,
+    orthonormal,
+    step_products,
+)
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.switching import StepSignals
 

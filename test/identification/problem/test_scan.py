@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from stiction_ros.effects import FloatArray
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.identification.kernels.delay import delay_energy, delay_room, pattern_energy
+from stiction_ros.identification.kernels.delay import delay_energy, pattern_energy
 from stiction_ros.identification.problem.models import Model, linear_model, refit
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import prepare, window
@@ -54,10 +54,10 @@ def test_pattern_energy_is_that_of_the_stem_it_stands_for(seed: int, nb: int, p:
     a, d = np.array([1.0, -0.8]), np.array([1.0, 0.3, 0.1])[: p + 1]
     scan = OutputScan(y, other, (1,), Orders(1, nb, p, 20), (0, 3), d, a)
     products, rights = scan.products(StepSignals.of(bases, signs))
-    energy, room = np.empty((4, scan.delays)), delay_room(nb, 3 + nb)
+    energy = np.empty((4, scan.delays))
     for f in range(3):
         for g in range(4):
-            pattern_energy(products[g], rights[g], levels[g, f], scan.rest_energy, room, energy[g])
+            pattern_energy(products[g], rights[g], levels[g, f], scan.rest_energy, energy[g])
         expected = energy_of(scan, StepSignals.of(bases - levels[:, f] * signs))
         assert energy == pytest.approx(expected, rel=1e-7)
 
