@@ -29,20 +29,9 @@ ONE_AT_A_TIME = threading.RLock()  # numba's settings are those of the process, 
 DIGITS = 12  # of what stands for a content
 COMPILING = "compiling what this needs, once on this machine: less than a minute"
 
-_helping: list[Callable[[], None]] = []
-
-
-def at_next_compilation(begin: Callable[[], None]) -> None:
-    """Let ``begin`` be called once, when the next function is not found in the cache.
-
-    It may start another process that compiles as well and keeps the result. Where nothing can be
-    kept it is never called.
-    """
-    _helping.append(begin)
-
 
 class _Teller(event.Listener):
-    """Logs the first function that was not found in the cache, and lets others help."""
+    """Logs the first function that was not found in the cache."""
 
     told = False
 
@@ -50,9 +39,6 @@ class _Teller(event.Listener):
         if not self.told:
             self.told = True
             logging.getLogger(__name__).info(COMPILING)
-        if event.data["dispatcher"].stats.cache_path is not None:
-            while _helping:
-                _helping.pop()()
 
     def on_end(self, event: event.Event) -> None:
         """Do nothing: the next one begins, or all are made."""

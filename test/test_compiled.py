@@ -110,29 +110,3 @@ def test_threads_that_import_at_once_keep_machine_code_where_the_next_process_lo
     subprocess.run([sys.executable, "-c", code], env=os.environ | path, check=True)
     made = {file.relative_to(package).parts[1] for file in package.rglob("*.more-*.nbi")}
     assert sorted(folder.rpartition("-")[0] for folder in made) == sorted(names)
-
-
-HELPED = """
-from stiction_ros.compiled import at_next_compilation
-at_next_compilation(lambda: print("helped"))
-from taken.caller import more
-more(3.0), more(4.0)
-"""
-
-
-def helped(package: Path) -> list[str]:
-    path = {"PYTHONPATH": os.pathsep.join((str(package.parent), *sys.path))}
-    told = subprocess.run(
-        [sys.executable, "-c", HELPED],
-        env=os.environ | path,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return told.stdout.split()
-
-
-@pytest.mark.trial
-def test_others_help_once_and_only_where_something_is_compiled(package: Path) -> None:
-    assert helped(package) == ["helped"]
-    assert helped(package) == []

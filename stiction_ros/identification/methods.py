@@ -84,9 +84,6 @@ def identify(
 def _identify(
     record: Record, options: IdentificationOptions, progress: Progress | None
 ) -> Identification:
-    from stiction_ros.identification.ahead import offer  # slow to import, and needed from here on
-
-    offer()
     checked = partial(swapped_columns, record)
     found: Identification | InputError
     if options.check_columns and options.method == "exact":  # as long as the check itself

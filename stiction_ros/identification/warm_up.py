@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects import HeStiction
-from stiction_ros.identification.ahead import ask
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.methods import METHODS, identify
 from stiction_ros.records.record import Record
@@ -14,19 +13,12 @@ from stiction_ros.signals.polynomials import recursion
 SAMPLES = 240
 
 
-def compile_loops(methods: Sequence[str] = tuple(METHODS), helped: bool = False) -> None:
+def compile_loops(methods: Sequence[str] = tuple(METHODS)) -> None:
     """Identify a short made-up record by each of ``methods``.
 
     The first call on a machine compiles for many seconds and keeps the result; later ones
     take a fraction of a second.
-
-    Args:
-        methods: of identification.
-        helped: whether another process may compile as well, though this one is itself the helper of
-            another: where no other one like it compiles.
     """
-    if helped:
-        ask()
     generator = np.random.default_rng(0)
     op = 10.0 * np.sin(0.2 * np.arange(SAMPLES)) + generator.standard_normal(SAMPLES)
     stem = HeStiction(4.0, 1.0).simulate(op)

@@ -35,7 +35,7 @@ class FitWorker:
         others = set(multiprocessing.active_children())
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_settle)
         # Before the first window is full.
-        self._compiled = self._pool.submit(compile_loops, self._methods, helped=True)
+        self._compiled = self._pool.submit(compile_loops, self._methods)
         self._processes = set(multiprocessing.active_children()) - others
 
     @property
