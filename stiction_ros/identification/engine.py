@@ -3,7 +3,6 @@
 import dataclasses
 import time
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
@@ -32,7 +31,6 @@ from stiction_ros.identification.result import (
     VerdictKind,
     halves,
 )
-from stiction_ros.identification.side_by_side import at_once, together
 from stiction_ros.identification.switching import require_cells
 from stiction_ros.records.record import Record
 
@@ -82,16 +80,13 @@ def judged_valves(
 ) -> tuple[tuple[ValveEstimate, ...], Model]:
     """Return the estimates and the final model, judged against the friction-free rivals.
 
-    Frictions are in the middle of their intervals. Those of the first valve are found beside the
-    rivals; those of another begin where the one before ends.
+    Frictions are in the middle of their intervals. Those of a valve begin where the one before
+    ends.
     """
-    rivals, first = at_once(
-        lambda: [linear_rivals(data, model, linear, j) for j in range(len(data.u))],
-        lambda: friction_intervals(data, model, 0, options.confidence),
-    )
+    rivals = [linear_rivals(data, model, linear, j) for j in range(len(data.u))]
     valves = []
     for j in range(len(data.u)):
-        intervals = friction_intervals(data, model, j, options.confidence) if j else first
+        intervals = friction_intervals(data, model, j, options.confidence)
         model = intervals.model
         span = float(np.ptp(data.u[j]))
         figures = evidence(model, rivals[j], j, span)
@@ -165,7 +160,7 @@ def choose(
     found, pairs = search(data, linear)
     if len(orders_list) == 1:
         return linear, found, pairs, (order_row(found),)
-    models = together(*(partial(linear_model, data, n, found) for n in orders_list))
+    models = [linear_model(data, orders, found) for orders in orders_list]
     best = min(models, key=lambda rival: rival.bic)
     if best.orders != start:
         linear = linear_model(data, best.orders)
@@ -229,7 +224,7 @@ def linear_rivals(data: Data, model: Model, linear: Model, valve: int) -> list[M
         known = raised == linear.orders and not freed.friction.any()
         return linear if known else refit(data, own, raised, warm=False)
 
-    rivals = [freed, *together(*(partial(of_order, extra) for extra in (2, 1, 0)))]
+    rivals = [freed, *map(of_order, (2, 1, 0))]
     best = min(rivals, key=lambda rival: rival.bic)
     return [*rivals, improve_delays(data, best)]
 

@@ -8,14 +8,11 @@
 
 import os
 from collections.abc import Callable, Mapping
-from functools import partial
 
 from stiction_ros.checks import of_kind
-from stiction_ros.errors import InputError
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
 from stiction_ros.identification.result import Identification
-from stiction_ros.identification.side_by_side import at_once
 from stiction_ros.intake.intake import record_of
 from stiction_ros.one_thread import one_thread
 from stiction_ros.records.record import Record
@@ -77,33 +74,10 @@ def identify(
     """
     measured = record_of(record)
     chosen = IdentificationOptions() if options is None else options
+    of_kind(chosen, IdentificationOptions, "options")
     with one_thread():
-        return _identify(measured, of_kind(chosen, IdentificationOptions, "options"), progress)
+        refuse_swapped(measured, swapped_columns(measured) if chosen.check_columns else None)
+        found = METHODS[chosen.method](measured, chosen, progress)
+        from stiction_ros.identification.answer.advice import advised  # slow to import, now loaded
 
-
-def _identify(
-    record: Record, options: IdentificationOptions, progress: Progress | None
-) -> Identification:
-    checked = partial(swapped_columns, record)
-    found: Identification | InputError
-    if options.check_columns and options.method == "exact":  # as long as the check itself
-        found, evidence = at_once(partial(_attempt, record, options, progress), checked)
-        refuse_swapped(record, evidence)
-    else:
-        refuse_swapped(record, checked() if options.check_columns else None)
-        found = _attempt(record, options, progress)
-    if isinstance(found, InputError):
-        raise found
-    from stiction_ros.identification.answer.advice import advised  # slow to import, now loaded
-
-    return advised(record, found, options)
-
-
-def _attempt(
-    record: Record, options: IdentificationOptions, progress: Progress | None
-) -> Identification | InputError:
-    """Return what the method finds or what it refuses: swapped columns are a better reason."""
-    try:
-        return METHODS[options.method](record, options, progress)
-    except InputError as error:
-        return error
+        return advised(measured, found, chosen)

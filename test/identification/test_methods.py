@@ -40,11 +40,15 @@ def test_each_method_signs_its_result(method: str) -> None:
 def test_a_path_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     record = loops.example1(0, samples=300)
     write_csv(record, tmp_path / "loop.csv")
-    monkeypatch.setattr(methods, "_identify", lambda record, *_: record)
+
+    def refuse(read: Record, *_: object) -> None:
+        assert np.array_equal(read.op, record.op)
+        raise InputError("read")
+
+    monkeypatch.setattr(methods, "METHODS", {"evidence": refuse})
     for path in (tmp_path / "loop.csv", str(tmp_path / "loop.csv")):
-        found: object = identify(path)
-        assert isinstance(found, Record)
-        assert np.array_equal(found.op, record.op)
+        with pytest.raises(InputError, match="read"):
+            identify(path)
 
 
 @pytest.mark.parametrize("call", [identify, fit_linear])

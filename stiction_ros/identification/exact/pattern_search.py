@@ -7,7 +7,6 @@ the (J, S) plane. Which rectangle is worth it is for :mod:`.neighbourhood` and
 
 import dataclasses
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,6 @@ from stiction_ros.identification.problem.models import (
     ValveScan,
     output_scans,
 )
-from stiction_ros.identification.side_by_side import together
 from stiction_ros.identification.switching import (
     Beginning,
     Cells,
@@ -36,7 +34,6 @@ from stiction_ros.identification.switching import (
 )
 
 BATCH = 500  # stems that are worked on together
-WORTHWHILE = 400_000  # samples of all stems or patterns, from which on two threads share them
 FEW = 60  # cells too few to tell how many there will be
 MOST_LEVELS = 30
 INSIDE = 1e-9  # of a range; how far from its edge
@@ -80,19 +77,14 @@ class PatternSearch:
         begins = self.u[0] + starts
         loss, moves = np.zeros(len(grid)), np.zeros(len(grid))
         best = np.zeros((len(grid), len(self.scans)), dtype=int)
-
-        def scanned(rows: slice) -> None:
+        for at in range(0, len(grid), BATCH):
+            rows = slice(at, at + BATCH)
             stems = stem_steps(self.law, grid[rows], self.u, begins[rows])
             moves[rows] = stems.moves
             for i, scan in enumerate(self.scans):
                 energy, delays = scan.least_energy(stems)
                 best[rows, i] = delays + self.ranges[i][0]
                 loss[rows] += scan.count * np.log(energy / scan.count)
-
-        shared = len(grid) * len(self.u) >= WORTHWHILE
-        batch = min(BATCH, (len(grid) + 1) // 2) if shared else BATCH
-        batches = (slice(at, at + batch) for at in range(0, len(grid), batch))
-        together(*(partial(scanned, rows) for rows in batches))
         return ValveScan(grid, starts, loss, best, moves)
 
     def evaluate(self, cells: Cells) -> PatternScan:
@@ -174,17 +166,6 @@ class PatternSearch:
         Returns:
             Best level (G,), second derivative (G,), loss (G,), delays (G, p).
         """
-        if patterns.size * patterns.count < WORTHWHILE:
-            return self._minimised_part(patterns, ranges)
-        halves = np.array_split(np.arange(patterns.size), 2)
-        parts = ((patterns.chosen(half), ranges[half]) for half in halves)
-        found = together(*(partial(self._minimised_part, *part) for part in parts))
-        levels, second, loss, delays = map(np.concatenate, zip(*found, strict=True))
-        return levels, second, loss, delays
-
-    def _minimised_part(
-        self, patterns: StepSignals, ranges: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         found = [scan.products(patterns) for scan in self.scans]
         width, lags = found[0][0].shape[2], max(own.shape[3] for own, _ in found)
         products = np.zeros((patterns.size, len(found), 3, width, lags))

@@ -8,8 +8,7 @@ the best switching pattern of its neighbourhood (:mod:`.pattern_search`).
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -26,7 +25,6 @@ from stiction_ros.identification.friction import (
     finer_grid,
 )
 from stiction_ros.identification.problem.models import Criterion, Data, Model, ValveScan, with_valve
-from stiction_ros.identification.side_by_side import together
 
 STEPS = 80
 WORK = 24_000_000
@@ -98,9 +96,6 @@ def first_search(data: Data, first: FirstScan, growing: bool) -> Model:
         growing: take a short record in piece by piece as well, under He's law.
     """
     model, valve, limit = first.model, first.valve, float(data.limit[first.valve])
-    piece_by_piece: list[Callable[[], Model]] = []
-    if growing and data.law is HeStiction and data.y.shape[1] <= LONGEST:
-        piece_by_piece = [partial(growing_patterns, data, model, valve)]
 
     def from_scan(scan: ValveScan, criterion: Criterion) -> Model:
         count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
@@ -112,20 +107,14 @@ def first_search(data: Data, first: FirstScan, growing: bool) -> Model:
         moved, parents = dataclasses.replace(model, start=start), scan.grid[chosen]
         return descend(data, moved, valve, parents, criterion, None, False)
 
-    rivals = together(
-        *piece_by_piece,
-        *(partial(from_scan, scan, criterion) for criterion, scan in first.scans.items()),
-        lambda: _from_fitted(data, first),
-        *(partial(from_scan, other, Criterion.ONE_STEP) for other in first.better_beginnings),
-    )
+    rivals = []
+    if growing and data.law is HeStiction and data.y.shape[1] <= LONGEST:
+        rivals.append(growing_patterns(data, model, valve))
+    rivals += [from_scan(scan, criterion) for criterion, scan in first.scans.items()]
+    rivals.append(_from_fitted(data, first))
+    rivals += [from_scan(other, Criterion.ONE_STEP) for other in first.better_beginnings]
     promising = sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]
-    closer = together(
-        *(
-            partial(comb, data, rival, valve)
-            for rival in promising
-            if rival.friction[valve, 0] > 0.0
-        )
-    )
+    closer = [comb(data, rival, valve) for rival in promising if rival.friction[valve, 0] > 0.0]
     return min([model, *closer], key=lambda candidate: candidate.loss)
 
 
@@ -256,7 +245,7 @@ def search(
     """
     left, rivals = list(range(len(data.u))), []
     while left:
-        scans = together(*(partial(first_scan, data, model, valve) for valve in left))
+        scans = [first_scan(data, model, valve) for valve in left]
         first = max(scans, key=lambda scan: scan.gain)
         found = first_search(data, first, growing)
         model = improve_valve(data, found, first.valve)

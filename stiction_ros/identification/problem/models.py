@@ -6,7 +6,6 @@ Delays are chosen channel by channel, by the exact fit under the noise model.
 import dataclasses
 import enum
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from stiction_ros.identification.friction import simulate
 from stiction_ros.identification.kernels.scan import best_apart
 from stiction_ros.identification.problem.output_error import Orders, OutputFit, fit_output
 from stiction_ros.identification.problem.scan import OutputScan
-from stiction_ros.identification.side_by_side import together
 from stiction_ros.identification.switching import StepSignals
 
 DELAY_MARGIN = 10.8
@@ -171,8 +169,7 @@ def refit(data: Data, model: Model, orders: Orders, warm: bool = True) -> Model:
         usable = old if old is not None and old.orders == orders else None
         return fit_output(data.y[i], model.stems, model.delays[i], orders, usable)
 
-    fits = together(*(partial(fitted, i) for i in range(len(data.y))))
-    return dataclasses.replace(model, fits=tuple(fits))
+    return dataclasses.replace(model, fits=tuple(map(fitted, range(len(data.y)))))
 
 
 def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model:
@@ -268,5 +265,4 @@ def _neighbours(data: Data, model: Model, i: int, j: int) -> dict[int, OutputFit
             best, delay = min(best, met[delay].loss), delay + shift
         return met
 
-    shorter, longer = together(partial(outwards, -1), partial(outwards, 1))
-    return {now: model.fits[i]} | shorter | longer
+    return {now: model.fits[i]} | outwards(-1) | outwards(1)

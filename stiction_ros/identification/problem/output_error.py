@@ -14,7 +14,6 @@ is n log(Σε²/n) + n κ Σw²/Σy² with a small κ: where the free run is goo
 import dataclasses
 import functools
 import math
-from functools import partial
 
 import numpy as np
 
@@ -28,7 +27,6 @@ from stiction_ros.identification.kernels.output_error import (
     Room,
 )
 from stiction_ros.identification.kernels.row import averaged
-from stiction_ros.identification.side_by_side import together
 
 ROUGH = (0.3, 0.0)  # least gain of an iteration and least promised one
 FINE = (1e-3, 1e-4)
@@ -154,14 +152,10 @@ def fit_output(
     # The starts are told apart by a rough descent; the best goes on to the end, with Σw²
     # priced anew by the innovations of a good model.
     if start is not None:
-        rough = [descend(problem, room, Start(start.a, start.noise, 0.0), max_iterations, ROUGH)]
+        starts: tuple[Start, ...] = (Start(start.a, start.noise, 0.0),)
     else:
-        rooms = (room, room_for(problem, orders))
         starts = cold_starts(problem, room, orders.output, orders.noise)
-        pairs = zip(rooms, starts, strict=True)
-        rough = together(
-            *(partial(descend, problem, own, one, max_iterations, ROUGH) for own, one in pairs)
-        )
+    rough = [descend(problem, room, one, max_iterations, ROUGH) for one in starts]
     best = min(rough, key=lambda point: loss_of(problem, point))
     again = Start(best.a, best.noise, best.energy)
     point = descend(problem, room, again, max_iterations, FINE)
