@@ -10,7 +10,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 
 LOOP_KINDS = ("flow", "pressure", "level", "temperature", "analyser")
-METHOD_NAMES = ("exact", "evidence")
+METHODS = ("exact", "evidence")
 AUTO = "auto"
 
 
@@ -91,7 +91,7 @@ class IdentificationOptions:
         return "he" if self.law == AUTO else self.law
 
     def __post_init__(self) -> None:
-        one_of(self.method, METHOD_NAMES, "method")
+        one_of(self.method, METHODS, "method")
         if self.kind is not None:
             one_of(self.kind, LOOP_KINDS, "kind", "kind")
         low, high = self.delay

@@ -7,7 +7,7 @@
 """
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from stiction_ros.checks import of_kind
 from stiction_ros.identification.identification_options import IdentificationOptions
@@ -21,23 +21,15 @@ Progress = Callable[[float], None]
 Method = Callable[[Record, IdentificationOptions, Progress | None], Identification]
 
 
-def _exact(
-    record: Record, options: IdentificationOptions, progress: Progress | None
-) -> Identification:
-    from stiction_ros.identification.engine import identify_exact  # slow to import
+def search_of(method: str) -> Method:
+    """Return what searches by a method, which is slow to import."""
+    if method == "exact":
+        from stiction_ros.identification.engine import identify_exact
 
-    return identify_exact(record, options, progress)
+        return identify_exact
+    from stiction_ros.identification.evidence.engine import identify_by_evidence
 
-
-def _by_evidence(
-    record: Record, options: IdentificationOptions, progress: Progress | None
-) -> Identification:
-    from stiction_ros.identification.evidence.engine import identify_by_evidence  # slow to import
-
-    return identify_by_evidence(record, options, progress)
-
-
-METHODS: Mapping[str, Method] = {"exact": _exact, "evidence": _by_evidence}
+    return identify_by_evidence
 
 
 def identify(
@@ -77,7 +69,7 @@ def identify(
     of_kind(chosen, IdentificationOptions, "options")
     with one_thread():
         refuse_swapped(measured, swapped_columns(measured) if chosen.check_columns else None)
-        found = METHODS[chosen.method](measured, chosen, progress)
+        found = search_of(chosen.method)(measured, chosen, progress)
         from stiction_ros.identification.answer.advice import advised  # slow to import, now loaded
 
         return advised(measured, found, chosen)

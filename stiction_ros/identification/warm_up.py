@@ -5,15 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects import HeStiction
-from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.methods import METHODS, identify
+from stiction_ros.identification.identification_options import METHODS, IdentificationOptions
+from stiction_ros.identification.methods import identify
 from stiction_ros.records.record import Record
 from stiction_ros.signals.polynomials import recursion
 
 SAMPLES = 240
 
 
-def compile_loops(methods: Sequence[str] = tuple(METHODS)) -> None:
+def compile_loops(methods: Sequence[str] = METHODS) -> None:
     """Identify a short made-up record by each of ``methods``.
 
     The first call on a machine compiles for many seconds and keeps the result; later ones

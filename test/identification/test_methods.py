@@ -15,7 +15,6 @@ import simulated_loops as loops
 from stiction_ros.errors import InputError
 from stiction_ros.identification import METHODS, IdentificationOptions, identify, methods
 from stiction_ros.identification.evidence import engine
-from stiction_ros.identification.identification_options import METHOD_NAMES
 from stiction_ros.identification.linear.fit import fit_linear
 from stiction_ros.records.csv_writer import write_csv
 from stiction_ros.records.record import Record
@@ -23,11 +22,7 @@ from stiction_ros.records.record import Record
 SMALL = IdentificationOptions(output_order=1, input_order=1, delay=(5, 5), friction_limit=6.0)
 
 
-def test_the_table_and_the_options_name_the_same_methods() -> None:
-    assert tuple(METHODS) == METHOD_NAMES
-
-
-@pytest.mark.parametrize("method", METHOD_NAMES)
+@pytest.mark.parametrize("method", METHODS)
 def test_each_method_signs_its_result(method: str) -> None:
     record = loops.example1(0, samples=300)
     found = identify(record, dataclasses.replace(SMALL, method=method))
@@ -45,7 +40,7 @@ def test_a_path_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
         assert np.array_equal(read.op, record.op)
         raise InputError("read")
 
-    monkeypatch.setattr(methods, "METHODS", {"evidence": refuse})
+    monkeypatch.setattr(methods, "search_of", lambda method: refuse)
     for path in (tmp_path / "loop.csv", str(tmp_path / "loop.csv")):
         with pytest.raises(InputError, match="read"):
             identify(path)
@@ -88,7 +83,7 @@ def test_options_of_methods_are_checked(wrong: dict[str, object]) -> None:
         IdentificationOptions(**wrong)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("method", METHOD_NAMES)
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("case", ["constant op", "constant pv", "short", "law"])
 def test_unusable_records_are_refused(method: str, case: str) -> None:
     record = loops.example1(0, samples=300)
@@ -128,7 +123,7 @@ def _swapped() -> Record:
 def test_swapped_columns_are_refused_before_a_slow_method_begins(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(methods, "METHODS", {"evidence": lambda *_: pytest.fail("it began")})
+    monkeypatch.setattr(methods, "search_of", lambda method: pytest.fail("it began"))
     with pytest.raises(InputError, match="look swapped"):
         identify(_swapped(), IdentificationOptions(method="evidence"))
 
@@ -139,7 +134,7 @@ def test_swapped_columns_are_a_better_reason_than_what_the_method_says(
     def refuse(*_: object) -> None:
         raise InputError("too short")
 
-    monkeypatch.setattr(methods, "METHODS", {"evidence": refuse})
+    monkeypatch.setattr(methods, "search_of", lambda method: refuse)
     with pytest.raises(InputError, match="look swapped"):
         identify(_swapped())
     with pytest.raises(InputError, match="too short"):
