@@ -14,7 +14,6 @@ from stiction_ros.compiled import compiled, compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.kernels.copies import put
 from stiction_ros.identification.kernels.delay import DEPENDENT, delay_energy
-from stiction_ros.identification.kernels.row import driven_rows
 
 STEMS = 64  # whose products are kept at a time
 
@@ -143,43 +142,55 @@ def _plain_products(
 
 
 @compiled
-def _driving(window: Window, places: IntArray, values: FloatArray, out: FloatArray) -> None:
-    """Write D x of a signal given by its moves, shape (N,)."""
-    before, total = 0.0, 0.0
-    for k in range(len(out)):
-        out[k] = 0.0
-    for i in range(len(places)):
-        step = values[i] - before
-        before = values[i]
-        for d in range(min(len(window.numerator), window.samples - places[i])):
-            out[places[i] + d] += step * window.numerator[d]
-    for k in range(len(out)):
-        total += out[k]
-        out[k] = total
+def _driving(
+    window: Window, offsets: IntArray, places: IntArray, values: FloatArray, out: FloatArray
+) -> None:
+    """Write D x of signals given by their moves, side by side, shape (c, N, G)."""
+    out[:] = 0.0
+    for g in range(out.shape[2]):
+        for c in range(len(out)):
+            before = 0.0
+            for move in range(offsets[g], offsets[g + 1]):
+                step, at = values[move, c] - before, places[move]
+                before = values[move, c]
+                for d in range(min(len(window.numerator), window.samples - at)):
+                    out[c, at + d, g] += step * window.numerator[d]
+
+
+@compiled_fused
+def _recursion(a: FloatArray, z: FloatArray) -> None:
+    """Replace the changes of signals by their sums over A, in place, shape (N, G)."""
+    order, size = len(a) - 1, z.shape[1]
+    driving = np.zeros(size)
+    for k in range(len(z)):
+        now = z[k]
+        for g in range(size):
+            driving[g] += now[g]
+            now[g] = driving[g]
+        for i in range(min(order, k), 0, -1):
+            factor, before = a[i], z[k - i]
+            for g in range(size):
+                now[g] -= factor * before[g]
 
 
 @compiled_fused
 def _products(window: Window, x: FloatArray, s: FloatArray, out: FloatArray) -> None:
-    """Add sums over k ≥ first of x[k − l] s[k − l − d] to a block, shape (width, L)."""
-    begin, end, width = window.first - window.lag, window.samples - window.lag, window.width
-    first = np.empty(width)
-    for one in range(0, width, 3):  # three d at a time, at the end the last one repeatedly
-        two, three = min(one + 1, width - 1), min(one + 2, width - 1)
-        a, b, c = 0.0, 0.0, 0.0
-        for k in range(begin, end):
-            now = x[k]
-            a += now * s[k - one]
-            b += now * s[k - two]
-            c += now * s[k - three]
-        first[one], first[two], first[three] = a, b, c
-    for d in range(width):
-        total = first[d]
-        out[d, 0] += total
+    """Write sums over k ≥ first of x[k − l] s[k − l − d], shape (width, L, G)."""
+    begin, end, size = window.first - window.lag, window.samples - window.lag, x.shape[1]
+    out[:] = 0.0
+    for k in range(begin, end):
+        now = x[k]
+        for d in range(window.width):
+            total, before = out[d, 0], s[k - d]
+            for g in range(size):
+                total[g] += now[g] * before[g]
+    for d in range(window.width):
         for position in range(1, window.lags - d):
             before, last = begin - position, end - position
-            gained = x[before] * s[before - d]
-            total = total + (gained - x[last] * s[last - d])
-            out[d, position] += total
+            for g in range(size):
+                gained = x[before, g] * s[before - d, g]
+                lost = x[last, g] * s[last - d, g]
+                out[d, position, g] = out[d, position - 1, g] + (gained - lost)
 
 
 @compiled
@@ -187,20 +198,17 @@ def _filtered_products(
     window: Window, offsets: IntArray, places: IntArray, values: FloatArray, out: FloatArray
 ) -> None:
     """Add lagged products of signals through D/A to ``out``, shape (G, pairs, width, L)."""
-    channels = values.shape[1]
-    driving, z = np.empty((2, window.samples)), np.empty((2, window.samples))
-    each = len(z) // channels  # signals at a time, as the rows wait for their last values
-    for group in range(0, len(out), each):
-        rows = channels * min(each, len(out) - group)
-        for row in range(rows):
-            g, c = group + row // channels, row % channels
-            part = slice(offsets[g], offsets[g + 1])
-            _driving(window, places[part], values[part, c], driving[row])
-        driven_rows(window.denominator, driving, 0, rows, z)
-        for row in range(rows):
-            g, c = group + row // channels, row % channels
-            for other in range(channels):
-                _products(window, z[row], z[row - c + other], out[g, c + other])
+    size, channels = len(out), values.shape[1]
+    z = np.empty((channels, window.samples, size))
+    sums = np.empty((window.width, window.lags, size))
+    _driving(window, offsets, places, values, z)
+    for c in range(channels):
+        _recursion(window.denominator, z[c])
+    for one in range(channels):
+        for two in range(channels):
+            _products(window, z[one], z[two], sums)
+            for g in range(size):
+                out[g, one + two] += sums[:, :, g]
 
 
 @compiled
