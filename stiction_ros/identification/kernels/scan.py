@@ -12,7 +12,7 @@ import numpy as np
 
 from stiction_ros.compiled import compiled, compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.kernels.copies import put
+from stiction_ros.identification.kernels.copies import add_block, put
 from stiction_ros.identification.kernels.delay import DEPENDENT, delay_energy
 
 STEMS = 64  # whose products are kept at a time
@@ -145,8 +145,7 @@ def _plain_products(
 def _driving(
     window: Window, offsets: IntArray, places: IntArray, values: FloatArray, out: FloatArray
 ) -> None:
-    """Write D x of signals given by their moves, side by side, shape (c, N, G)."""
-    out[:] = 0.0
+    """Add the changes of D x of signals given by their moves, side by side, shape (c, N, G)."""
     for g in range(out.shape[2]):
         for c in range(len(out)):
             before = 0.0
@@ -174,10 +173,10 @@ def _recursion(a: FloatArray, z: FloatArray) -> None:
 
 
 @compiled_fused
-def _products(window: Window, x: FloatArray, s: FloatArray, out: FloatArray) -> None:
-    """Write sums over k ≥ first of x[k − l] s[k − l − d], shape (width, L, G)."""
+def _products(window: Window, x: FloatArray, s: FloatArray) -> FloatArray:
+    """Return sums over k ≥ first of x[k − l] s[k − l − d], shape (width, L, G)."""
     begin, end, size = window.first - window.lag, window.samples - window.lag, x.shape[1]
-    out[:] = 0.0
+    out = np.zeros((window.width, window.lags, size))
     for k in range(begin, end):
         now = x[k]
         for d in range(window.width):
@@ -191,6 +190,7 @@ def _products(window: Window, x: FloatArray, s: FloatArray, out: FloatArray) -> 
                 gained = x[before, g] * s[before - d, g]
                 lost = x[last, g] * s[last - d, g]
                 out[d, position, g] = out[d, position - 1, g] + (gained - lost)
+    return out
 
 
 @compiled
@@ -199,16 +199,15 @@ def _filtered_products(
 ) -> None:
     """Add lagged products of signals through D/A to ``out``, shape (G, pairs, width, L)."""
     size, channels = len(out), values.shape[1]
-    z = np.empty((channels, window.samples, size))
-    sums = np.empty((window.width, window.lags, size))
+    z = np.zeros((channels, window.samples, size))
     _driving(window, offsets, places, values, z)
     for c in range(channels):
         _recursion(window.denominator, z[c])
     for one in range(channels):
         for two in range(channels):
-            _products(window, z[one], z[two], sums)
+            sums = _products(window, z[one], z[two])
             for g in range(size):
-                out[g, one + two] += sums[:, :, g]
+                add_block(out[g, one + two], sums[:, :, g])
 
 
 @compiled
