@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import BoolArray, FloatArray
-from stiction_ros.identification.valve_test.step_kernels import step_answers, white_rows
+from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
+from stiction_ros.identification.valve_test.step_kernels import white_rows
 from stiction_ros.identification.valve_test.steps import Steps
 
 OWN_ERROR = 0.05
@@ -77,6 +77,16 @@ class Shape:
         """Return how much of a step PV shows after some samples, but for the second lag."""
         return np.asarray(-np.expm1(-np.maximum(samples - self.dead, 0.0) / self.first))
 
+    def answers(self, rows: IntArray, count: int) -> FloatArray:
+        """Return the answer of both lags to a step at each of ``rows``, (M,), shape (count, M)."""
+        since = np.maximum(np.arange(count) - self.dead, 0.0)
+        slow, fast = (lag * np.exp(-since / lag) for lag in (self.first, self.second))
+        one = 1.0 - (slow - fast) / (self.first - self.second)
+        out = np.zeros((count, len(rows)))
+        for i, row in enumerate(rows.tolist()):
+            out[row:, i] = one[: count - row]
+        return out
+
     def unsure(self, samples: float) -> float:
         """Return the variance of the mean of PV over some samples, load and noise together."""
         kept, variance = self.noise
@@ -116,7 +126,7 @@ class Answered:
             steps: of OP.
             shape: process and noise.
         """
-        answers = step_answers(steps.rows, len(pv), shape.first, shape.second, shape.dead)
+        answers = shape.answers(steps.rows, len(pv))
         fading = -np.expm1(-np.arange(len(pv)) / shape.first)
         middle = pv - pv[seen].mean()
         columns = np.column_stack([answers, np.ones(len(pv)), fading / fading[-1], middle])

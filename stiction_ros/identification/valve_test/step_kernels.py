@@ -1,36 +1,11 @@
-"""Compiled: what a process makes of steps, and rows made white under load and noise."""
+"""Compiled: rows made white under load and noise."""
 
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 CONVERGED = 1e-12  # relative change of the variance from which on a gain is held
-
-
-@compiled
-def step_answers(
-    rows: IntArray, count: int, first: float, second: float, dead: float
-) -> FloatArray:
-    """Return the answer to a step of 1 at each of some samples, two lags in series, shape (N, M).
-
-    Args:
-        rows: samples of the steps, shape (M,).
-        count: N.
-        first, second: lags, samples, ``first`` above ``second``.
-        dead: dead time, samples.
-    """
-    one = np.empty(count)
-    for k in range(count):
-        time = k - dead
-        one[k] = 0.0
-        if time > 0.0:
-            slow, fast = first * np.exp(-time / first), second * np.exp(-time / second)
-            one[k] = 1.0 - (slow - fast) / (first - second)
-    out = np.zeros((count, len(rows)))
-    for i in range(len(rows)):
-        out[rows[i] :, i] = one[: count - rows[i]]
-    return out
 
 
 @compiled

@@ -4,7 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stiction_ros.identification.valve_test.step_kernels import step_answers, white_rows
+from stiction_ros.identification.valve_test.likelihood import Shape
+from stiction_ros.identification.valve_test.step_kernels import white_rows
 
 ROWS = 40
 
@@ -44,7 +45,7 @@ def test_white_rows_are_those_of_the_covariance(
 
 def test_a_step_is_answered_after_its_dead_time_and_in_full() -> None:
     rows = np.array([5, 20])
-    answers = step_answers(rows, 200, 8.0, 2.0, 3.0)
+    answers = Shape(8.0, 2.0, 3.0, 0.0, np.zeros(2)).answers(rows, 200)
     assert not answers[:9, 0].any()
     assert not answers[:24, 1].any()
     np.testing.assert_allclose(answers[-1], 1.0, atol=1e-6)
