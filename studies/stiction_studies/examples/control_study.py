@@ -123,13 +123,13 @@ class ColumnRun:
     Attributes:
         run: signals.
         times: of each step, ms.
-        choices: how often programme and warm start were applied; empty where there is none.
+        from_start: whether the warm start was applied, a step each; empty where there is none.
         statuses: how often each :class:`~stiction_ros.control.StepStatus` occurred.
     """
 
     run: ClosedLoopRun
     times: FloatArray
-    choices: Mapping[str, int]
+    from_start: tuple[bool, ...]
     statuses: Mapping[str, int]
 
 
@@ -238,15 +238,11 @@ def _run(
         return results[-1].op
 
     run = simulate_closed_loop(plant, control, schedule, samples, seed)
-    plans = [result.plan for result in results]
-    chosen = Counter(
-        "programme" if plan.programme_cost <= plan.warm_start_cost else "warm_start"
-        for plan in plans
-        if isinstance(plan, PrintedPlan)
-    )
+    plans = [result.plan for result in results if isinstance(result.plan, PrintedPlan)]
+    from_start = tuple(plan.warm_start_cost < plan.programme_cost for plan in plans)
     statuses = Counter(result.status.value for result in results)
     times = np.array([1e3 * result.solve_time for result in results])
-    return ColumnRun(run, times, dict(chosen), dict(statuses))
+    return ColumnRun(run, times, from_start, dict(statuses))
 
 
 def _plant(scenario: Scenario, options: StudyOptions) -> LoopModel:

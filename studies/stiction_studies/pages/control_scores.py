@@ -115,8 +115,7 @@ def _score(run: ColumnRun, period: float | None) -> ColumnScore:
         for j, tag in enumerate(record.valves)
     }
     median, last = np.median(run.times), np.percentile(run.times, 99)
-    total = sum(run.choices.values())
-    share = run.choices.get("warm_start", 0) / total if total else float("nan")
+    share = float(np.mean(run.from_start)) if run.from_start else float("nan")
     return ColumnScore(outputs, valves, float(median), float(last), share)
 
 

@@ -17,7 +17,7 @@ from stiction_studies.pages.control_scores import cycle_period, mean_score, scor
 SAMPLES, HOLD = 480, 240
 
 
-def column_run(error: FloatArray, stem: FloatArray, choices: dict[str, int]) -> ColumnRun:
+def column_run(error: FloatArray, stem: FloatArray, from_start: tuple[bool, ...]) -> ColumnRun:
     """A run of 1 min samples with one move in the middle; ``error`` of both outputs, (N,)."""
     sp = np.column_stack([np.repeat([7.5, 7.6], HOLD), np.repeat([42.0, 43.0], HOLD)])
     clean = sp + error[:, None]
@@ -25,7 +25,7 @@ def column_run(error: FloatArray, stem: FloatArray, choices: dict[str, int]) -> 
     stems = np.column_stack([stem, np.full(SAMPLES, 50.0)])
     record = Record("study", 60.0, ("V1", "V2"), ("C", "T"), stems + 1.0, noisy, sp, stems)
     times = np.linspace(1.0, 2.0, SAMPLES)
-    return ColumnRun(ClosedLoopRun(record, clean), times, choices, {"solved": SAMPLES})
+    return ColumnRun(ClosedLoopRun(record, clean), times, from_start, {"solved": SAMPLES})
 
 
 def made_up_trial(seed: int = 1) -> Trial:
@@ -36,8 +36,9 @@ def made_up_trial(seed: int = 1) -> Trial:
     for column in COLUMNS:
         cycles = column.key == "unaware"
         error = 0.1 * np.sin(angle) if cycles else np.full(SAMPLES, 0.02)
-        choices = {"programme": 360, "warm_start": 120} if column.key == "printed" else {}
-        runs[column.key] = column_run(error, square if cycles else np.full(SAMPLES, 50.0), choices)
+        from_start = (True, False, False, False) if column.key == "printed" else ()
+        stem = square if cycles else np.full(SAMPLES, 50.0)
+        runs[column.key] = column_run(error, stem, from_start)
     return Trial(StudyOptions(), seed, ("V1",), runs)
 
 
