@@ -25,7 +25,7 @@ WRONG = (
     ["convert", "no.csv", "out"],
     ["repair", "no_bag"],
     ["simulate", "no.loop.yaml"],
-    ["experiment", "prbs", "--model", "no.loop.yaml", "--out", "no.csv"],
+    ["simulate", "no.loop.yaml", "--moves", "prbs"],
     ["demo", "nowhere"],
     ["study", "nowhere"],
     ["study-change", "nowhere"],

@@ -67,7 +67,9 @@ def run(options: argparse.Namespace) -> int:
         compare.refuse_options(options)
     names = options.scenario or SCENARIOS
     paths = [find(name) for name in names if name != OPCUA]
-    opcua = extensions.needed_part("demo opcua") if OPCUA in names else None
+    opcua = extensions.part("demo opcua") if OPCUA in names else None
+    if OPCUA in names and opcua is None:
+        extensions.refuse("demo opcua")
     from stiction_ros.online.unit import load_scenario
 
     scenarios = [load_scenario(path) for path in paths]

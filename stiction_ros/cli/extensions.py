@@ -17,7 +17,7 @@ GROUP = "stiction.commands"
 STUDIES = "stiction-studies"
 OF_STUDIES = (
     *("bench", "calibrate", "example", "faults", "paper", "soak", "study", "study-change"),
-    *("study-control", "study-monitor", "demo opcua", "demo --compare", "experiment plant"),
+    *("study-control", "study-monitor", "demo opcua", "demo --compare", "experiment"),
 )
 """What ``stiction-studies`` brings, so that the command can say so where it is not installed."""
 
@@ -42,14 +42,6 @@ def part(name: str) -> Any | None:
     """Return the module of a part of a command; None where nothing brings it."""
     table = brought()
     return importlib.import_module(table[name][0]) if name in table else None
-
-
-def needed_part(name: str) -> Any:
-    """Return the module of a part of a command; InputError where nothing brings it."""
-    module = part(name)
-    if module is None:
-        refuse(name)
-    return module
 
 
 def refuse(name: str) -> NoReturn:

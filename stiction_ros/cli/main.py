@@ -28,8 +28,7 @@ COMMANDS = {
     "report": "a page of a record or of a recorded run",
     "gain": "what service or retuning would bring",
     "valve-test": "a test in manual: its moves, its verdict",
-    "experiment": "simulate moves of OP, or a plant of loops",
-    "simulate": "run a loop model under its own controller",
+    "simulate": "run a loop model under its controller or by moves",
     "fit-linear": "fit a linear model for a controller",
     "replay": "decide over a bag as the nodes did live",
     "demo": "a live loop: cycle, identify, swap, report",
@@ -47,7 +46,7 @@ DESCRIPTION = "Find, measure and control valves that stick."
 
 GROUPS = {
     "find: what is wrong with this loop": ("identify", "gap", "report"),
-    "decide: what to do about it": ("gain", "valve-test", "experiment", "simulate"),
+    "decide: what to do about it": ("gain", "valve-test", "simulate"),
     "act: control a valve that sticks": ("fit-linear", "replay"),
     "live: loops on ROS 2 and their bags": ("demo", "listen", "convert", "repair"),
     "plant: all loops and their control system": (

@@ -12,11 +12,12 @@ import numpy as np
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import foreign
-from stiction_ros.loop import LoopModel, SetPoints, simulate
+from stiction_ros.loop import LoopModel, SetPoints, prbs_experiment, simulate
 from stiction_ros.loop.excitation import simulate_open_loop
 from stiction_ros.records.record import Record
 
 SAMPLES, SEED = 2000, 1
+PRBS = "prbs"
 
 
 def add(commands: Any) -> None:
@@ -24,15 +25,18 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "simulate",
         description="Run a loop model in closed loop under the controller that it records "
-        "(controller: {kind: pi, …}), or in manual by a table of moves, and write OP, PV, SP and "
-        "the true stem position.",
+        "(controller: {kind: pi, …}), or in manual by moves, and write OP, PV, SP and the true "
+        "stem position.",
     )
     parser.add_argument("loop", metavar="LOOP", help="loop model, F.loop.yaml")
     parser.add_argument(
         "--set-points", metavar="F", help="schedule of set-points (default: the operating point)"
     )
     parser.add_argument(
-        "--moves", metavar="F.csv", help="in manual, by the moves that stiction valve-test writes"
+        "--moves",
+        metavar="F.csv|prbs",
+        help="in manual, by the moves that stiction valve-test writes; prbs: every valve without "
+        "its effects by a random binary sequence of its own, as in Appendix A of the paper",
     )
     parser.add_argument(
         "--samples", type=int, default=SAMPLES, metavar="N", help=f"number of samples ({SAMPLES})"
@@ -56,6 +60,11 @@ def run(options: argparse.Namespace) -> int:
     if options.set_points is not None:
         schedule = SetPoints.load(find_config(options.set_points), model.outputs)
     out = Path(path.name.split(".")[0] + ".csv" if options.out is None else options.out)
+    if options.moves == PRBS:
+        write(prbs_experiment(model.with_ideal_valves(), options.samples, options.seed), out)
+        told = f"{out}: {options.samples} samples; read it by"
+        print(told, shlex.join(["stiction", "fit-linear", str(out)]), sep="\n", file=sys.stderr)
+        return 0
     if options.moves is not None:
         write(by_hand(model, options.moves, options.seed), out)
         words = ["stiction", "valve-test", "judge", str(out)]

@@ -24,11 +24,10 @@ def test_help_of_the_core_alone_lists_only_what_works(capsys: pytest.CaptureFixt
     listed = {line.split()[0] for line in capsys.readouterr().err.splitlines() if line.strip()}
     assert set(COMMANDS) <= listed
     assert not {name for name in BROUGHT if " " not in name} & listed
-    for command in ("demo", "experiment"):
-        with pytest.raises(SystemExit):
-            main([command, "--help"])
-        said = capsys.readouterr().out
-        assert not [word for word in ("opcua", "--compare", "plant:") if word in said]
+    with pytest.raises(SystemExit):
+        main(["demo", "--help"])
+    said = capsys.readouterr().out
+    assert not [word for word in ("opcua", "--compare") if word in said]
 
 
 @pytest.mark.usefixtures("alone")
@@ -36,8 +35,7 @@ def test_help_of_the_core_alone_lists_only_what_works(capsys: pytest.CaptureFixt
 def test_what_is_not_installed_says_what_brings_it(
     name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = ["--out", "nowhere"] if name.startswith("experiment") else []
-    assert main([*name.split(), *out]) == 2
+    assert main(name.split()) == 2
     said = capsys.readouterr().err
     assert said.startswith(
         f"stiction: stiction {name}: comes with the distribution stiction-studies"

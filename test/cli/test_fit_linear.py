@@ -1,4 +1,4 @@
-"""`stiction experiment prbs` and `stiction fit-linear`, the paper's step repeated."""
+"""`stiction simulate --moves prbs` and `stiction fit-linear`, the paper's step repeated."""
 
 import dataclasses
 import json
@@ -16,20 +16,21 @@ from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.session import Scenario
 
 COLUMNS = shlex.split("--op V1=V1.OP --op V2=V2.OP --pv C=C.PV --pv T=T.PV")
+PRBS = ["simulate", "tank.loop.yaml", "--moves", "prbs"]
 
 
 @pytest.fixture(scope="module")
 def prbs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("experiment") / "prbs.csv"
-    assert main(["experiment", "prbs", "--seed", "1", "--samples", "600", "--out", str(path)]) == 0
+    assert main([*PRBS, "--seed", "1", "--samples", "600", "--out", str(path)]) == 0
     return path
 
 
-def test_experiment_says_how_to_read_its_record(
+def test_random_moves_say_how_to_read_its_record(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "prbs.csv"
-    assert main(["experiment", "prbs", "--samples", "300", "--out", str(path)]) == 0
+    assert main([*PRBS, "--samples", "300", "--out", str(path)]) == 0
     command = shlex.split(capsys.readouterr().err.splitlines()[-1])
     assert command[0] == "stiction"
     assert main([*command[1:], "--order", "2", "--json", "-"]) == 0
@@ -91,9 +92,9 @@ def test_record_without_model_is_exit_1(tmp_path: Path) -> None:
     "arguments",
     [
         ["fit-linear", "no.csv"],
-        ["experiment", "prbs", "--samples", "1", "--out", "x.csv"],
-        ["experiment", "prbs", "--samples", "5", "--seed", "-1", "--out", "x.csv"],
-        ["experiment", "prbs", "--samples", "5", "--model", "no.yaml", "--out", "x.csv"],
+        [*PRBS, "--samples", "0", "--out", "x.csv"],
+        [*PRBS, "--samples", "5", "--seed", "-1", "--out", "x.csv"],
+        ["simulate", "no.yaml", "--moves", "prbs", "--out", "x.csv"],
     ],
 )
 def test_what_cannot_be_used_is_one_line_and_exit_2(

@@ -130,7 +130,7 @@ def test_the_core_alone_lists_only_what_works(pip_prefix: Path, tmp_path: Path) 
     command = pip_prefix / "bin" / "stiction"
     listed = {line.split()[0] for line in run(command, "--help").splitlines() if line.strip()}
     assert {"identify", "simulate", "survey", "gap", "replay", "demo"} <= listed
-    assert not listed & {name.partition(" ")[0] for name in OF_STUDIES} - {"demo", "experiment"}
+    assert not listed & {name.partition(" ")[0] for name in OF_STUDIES} - {"demo"}
     history = tmp_path / "history.csv"
     run(command, "simulate", "flow.loop.yaml", "--samples", "600", "--out", history)
     assert history.stat().st_size > 0

@@ -15,7 +15,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         ("bench", "benches.command", "measure speed and accuracy"),
         ("demo opcua", "commands.demo_opcua", "the tank behind a control system"),
         ("demo --compare", "commands.compare", "Example 2 under five controllers, without ROS"),
-        ("experiment plant", "commands.experiment_plant", "a folder of exports of known truth"),
+        ("experiment", "commands.experiment_plant", "a folder of exports of known truth"),
     )
 }
 """Module of each command, loaded when it is called, and what ``--help`` says.

@@ -4,7 +4,7 @@ import argparse
 import functools
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from stiction_ros.errors import InputError
 from stiction_studies.seeds import add_jobs, run_each
@@ -12,18 +12,21 @@ from stiction_studies.seeds import add_jobs, run_each
 if TYPE_CHECKING:
     from stiction_studies.field.exports.plant import PlantLoop
 
-DESCRIPTION = (
-    "plant: simulate many loops of a plant and write the exports of its historian, in five forms "
-    "and with everything wrong that exports have; the truth stands beside the folder."
-)
 
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a plant to those of ``stiction experiment``."""
-    parser.add_argument(
-        "--loops", type=int, default=500, metavar="N", help="number of loops of a plant (500)"
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "experiment",
+        description="plant: simulate many loops of a plant and write the exports of its historian, "
+        "in five forms and with everything wrong that exports have; the truth stands beside.",
     )
+    option = parser.add_argument
+    option("name", choices=("plant",), help="the experiment")
+    option("--loops", type=int, default=500, metavar="N", help="number of loops of a plant (500)")
+    option("--seed", type=int, default=1, metavar="N", help="seed of the loops (1)")
+    option("--out", required=True, metavar="DIR", help="folder to write")
     add_jobs(parser)
+    parser.set_defaults(run=run)
 
 
 def made(seed: int, number: int) -> "PlantLoop":
@@ -34,7 +37,7 @@ def made(seed: int, number: int) -> "PlantLoop":
     return plant_loop(field_loop(loop_seed(seed, number)), seed, number)
 
 
-def run_plant(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Make a plant and write it."""
     from stiction_studies.field.exports.plant import export_plant
 
