@@ -20,9 +20,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.linear.data import nrmse_fit
-from stiction_ros.identification.problem.models import Data, Model
+from stiction_ros.identification.problem.models import FEWEST_MOVES, Data, Model
 from stiction_ros.identification.problem.output_error import OutputFit
 from stiction_ros.identification.result import (
     FitStatus,
@@ -35,6 +34,8 @@ from stiction_ros.identification.result import (
 )
 from stiction_ros.records.record import Record
 
+BELIEVED = 20.0  # BIC by which friction must beat the friction-free rival
+NEGLIGIBLE, NEGLIGIBLE_SHARE = 0.3, 0.03  # f_S up to which a valve is healthy, %, and of OP's span
 DEADBAND = 4.0
 """−2 log likelihood below which a deadband (J = 0) is not rejected: two standard deviations of the
 one parameter that it has less."""
@@ -156,11 +157,7 @@ def _mean_square(values: FloatArray) -> float:
 
 
 def judge(
-    figures: dict[str, float],
-    static: Interval,
-    dynamic: Interval,
-    span: float,
-    options: IdentificationOptions,
+    figures: dict[str, float], static: Interval, dynamic: Interval, span: float
 ) -> VerdictKind:
     """Return the verdict of one valve from its evidence and its interval of f_S.
 
@@ -169,19 +166,16 @@ def judge(
         static: interval of f_S, %.
         dynamic: interval of f_D, %.
         span: OP span of the valve, %.
-        options: the limits.
     """
-    negligible = max(options.negligible_share * span, min(options.negligible_friction, 0.1 * span))
-    believed = (
-        figures["delta_bic"] > options.bic_margin
-        and min(figures["half_1"], figures["half_2"]) > 0.0
-    )
-    if believed and static[0] > options.negligible_share * span:
-        if figures["moves"] < options.min_moves:
+    negligible = max(NEGLIGIBLE_SHARE * span, min(NEGLIGIBLE, 0.1 * span))
+    halves = min(figures["half_1"], figures["half_2"])
+    believed = figures["delta_bic"] > BELIEVED and halves > 0.0
+    if believed and static[0] > NEGLIGIBLE_SHARE * span:
+        if figures["moves"] < FEWEST_MOVES:
             return VerdictKind.UNDECIDED
         deadband = is_deadband(figures["deadband_loss"], static, dynamic)
         return VerdictKind.BACKLASH if deadband else VerdictKind.STICKY
-    if static[1] <= negligible and figures["moves"] >= options.min_moves:
+    if static[1] <= negligible and figures["moves"] >= FEWEST_MOVES:
         return VerdictKind.HEALTHY
     return VerdictKind.UNDECIDED
 

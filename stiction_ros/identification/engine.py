@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.identification.closed_loop.closed_loop import close_loop
 from stiction_ros.identification.closed_loop.explanation import explained
-from stiction_ros.identification.conclusion import conclude, evidence, is_deadband, judge
+from stiction_ros.identification.conclusion import BELIEVED, conclude, evidence, is_deadband, judge
 from stiction_ros.identification.exact.intervals import friction_intervals
 from stiction_ros.identification.exact.neighbourhood import REJECTED, refine
 from stiction_ros.identification.exact.search import comb, improve, search
@@ -91,10 +91,10 @@ def judged_valves(
         span = float(np.ptp(data.u[j]))
         figures = evidence(model, rivals[j], j, span)
         figures["deadband_loss"] = intervals.deadband_loss
-        doubted = figures["delta_bic"] <= options.bic_margin
+        doubted = figures["delta_bic"] <= BELIEVED
         static = (0.0, intervals.static[1]) if doubted else intervals.static
         dynamic = (0.0, intervals.dynamic[1]) if doubted else intervals.dynamic
-        verdict = judge(figures, static, dynamic, span, options)
+        verdict = judge(figures, static, dynamic, span)
         healthy = verdict is VerdictKind.HEALTHY
         f_s, f_d = intervals.static_estimate, intervals.dynamic_estimate
         if doubted and (figures["delta_bic"] < 0.0 or healthy):
@@ -119,7 +119,7 @@ def judged_valves(
             moves=int(np.count_nonzero(np.diff(model.stems[j]))),
             evidence=figures,
             profile=intervals.profile,
-            stability=Stability(halves(gains, options.bic_margin if healthy else None)),
+            stability=Stability(halves(gains, BELIEVED if healthy else None)),
         )
         valves.append(valve)
     return tuple(valves), model

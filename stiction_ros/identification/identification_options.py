@@ -54,10 +54,6 @@ class IdentificationOptions:
             OP span of each valve.
         noise_order: order p of the autoregressive noise on the free-run error.
         confidence: level of the intervals.
-        bic_margin: BIC by which friction must beat the friction-free rival to be believed.
-        min_moves: fewest stem moves from which anything may be concluded.
-        negligible_friction: f_S up to this is healthy, %.
-        negligible_share: f_S up to this share of the OP span is healthy.
         check_columns: refuse a record in which OP and PV are clearly swapped.
 
     Raises:
@@ -79,10 +75,6 @@ class IdentificationOptions:
     friction_limit: float | tuple[float, ...] | None = None
     noise_order: int = 6
     confidence: float = 0.95
-    bic_margin: float = 20.0
-    min_moves: int = 6
-    negligible_friction: float = 0.3
-    negligible_share: float = 0.03
     check_columns: bool = True
 
     @property

@@ -10,7 +10,8 @@ import yaml
 from stiction_ros.config_files import config_directories, find_config
 from stiction_ros.control import ControlMode
 from stiction_ros.errors import InputError
-from stiction_ros.identification import IdentificationOptions, VerdictKind
+from stiction_ros.identification import VerdictKind
+from stiction_ros.identification.problem.models import FEWEST_MOVES
 from stiction_ros.loop import LoopModel, ValveChange
 from stiction_ros.online.estimator.friction_change import ChangeStatus
 from stiction_ros.online.session import Scenario, run_live
@@ -82,7 +83,7 @@ def test_a_valve_of_another_law_than_the_embedded_one_is_never_called_healthy(
     assert [update.end for update in live.fits] == [999, 1499, 1999, 2499, 2999]
     assert live.changes[0].mode is ControlMode.EMBEDDING
     for valve in found:
-        assert valve.evidence["moves"] >= IdentificationOptions().min_moves
+        assert valve.evidence["moves"] >= FEWEST_MOVES
         assert valve.verdict is not VerdictKind.HEALTHY
         low, high = valve.static_interval
         assert low <= 5.0 <= high

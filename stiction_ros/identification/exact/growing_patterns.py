@@ -19,7 +19,13 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.exact.pattern_search import PatternSearch, points_of
 from stiction_ros.identification.friction import TURN, even_grid, samples_of_turns
-from stiction_ros.identification.problem.models import Criterion, Data, Model, with_valve
+from stiction_ros.identification.problem.models import (
+    FEWEST_MOVES,
+    Criterion,
+    Data,
+    Model,
+    with_valve,
+)
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.switching import Beginning, PatternScan, cells_at
 
@@ -176,7 +182,7 @@ def _fitted(data: Data, model: Model, valve: int, branches: list[Branch]) -> Mod
     cells = [
         (float(branch.scan.loss[i]), branch, int(i))
         for branch in branches
-        for i in np.flatnonzero(branch.scan.moves >= data.min_moves)
+        for i in np.flatnonzero(branch.scan.moves >= FEWEST_MOVES)
     ]
     best = model
     for _, branch, i in sorted(cells, key=lambda cell: cell[0])[:FITTED]:

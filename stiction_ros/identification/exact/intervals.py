@@ -8,7 +8,13 @@ from stiction_ros.deferred import chi2_quantile
 from stiction_ros.identification.exact.neighbourhood import refine
 from stiction_ros.identification.exact.pattern_search import PatternSearch, best_in_cells, points_of
 from stiction_ros.identification.friction import coarse_grid
-from stiction_ros.identification.problem.models import Data, Model, ValveScan, with_valve
+from stiction_ros.identification.problem.models import (
+    FEWEST_MOVES,
+    Data,
+    Model,
+    ValveScan,
+    with_valve,
+)
 from stiction_ros.identification.switching import PatternScan
 
 # f_S, f_D and one more for the choice among very many patterns.
@@ -86,7 +92,7 @@ def _without_standstill(
 
     They are judged by the scan and, where that does not reject them, by the exact fit.
     """
-    still = (scan.moves < data.min_moves) & (np.arange(len(scan.loss)) > 0)
+    still = (scan.moves < FEWEST_MOVES) & (np.arange(len(scan.loss)) > 0)
     if not still.any():
         return scan
     if scan.loss[still].min() > scan.loss[~still].min() + threshold:

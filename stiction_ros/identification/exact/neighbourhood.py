@@ -16,7 +16,7 @@ from stiction_ros.identification.exact.pattern_search import (
     points_of,
     remainders,
 )
-from stiction_ros.identification.problem.models import Data, Model, with_valve
+from stiction_ros.identification.problem.models import FEWEST_MOVES, Data, Model, with_valve
 from stiction_ros.identification.switching import (
     Beginning,
     Cells,
@@ -144,7 +144,7 @@ def refine(
             search, begin, model.friction[valve], threshold, most, before=before
         )
         found = reachable.scan
-        loss = np.where(found.moves >= data.min_moves, found.loss, np.inf)
+        loss = np.where(found.moves >= FEWEST_MOVES, found.loss, np.inf)
         best = int(loss.argmin())
         if not np.isfinite(loss[best]):
             break

@@ -99,7 +99,7 @@ def first_search(data: Data, first: FirstScan, growing: bool) -> Model:
 
     def from_scan(scan: ValveScan, criterion: Criterion) -> Model:
         count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
-        chosen = scan.best(count, data.min_moves, 0.5 * APART * limit)
+        chosen = scan.best(count, 0.5 * APART * limit)
         if not chosen:
             return model
         start = model.start.copy()
@@ -128,7 +128,7 @@ def _from_fitted(data: Data, first: FirstScan) -> Model:
     start = float(model.start[valve])
     fitted = [
         with_valve(data, model, valve, scan.grid[i], start, scan.delays[i], warm=False)
-        for i in scan.best(FITTED, data.min_moves, apart)
+        for i in scan.best(FITTED, apart)
     ]
     if not fitted:
         return model
@@ -149,7 +149,7 @@ def improve_valve(data: Data, model: Model, valve: int) -> Model:
         grid = np.vstack([coarse_grid(limit), cross])
         everywhere = PatternSearch(data, best, valve)
         scan = everywhere.scan(grid, float(best.start[valve]))
-        chosen = grid[scan.best(PARENTS - 2, data.min_moves, APART * limit)]
+        chosen = grid[scan.best(PARENTS - 2, APART * limit)]
         parents = np.vstack([friction, chosen])
         best = descend(data, best, valve, parents)
         if best.loss > before - LEAST_GAIN:
@@ -199,7 +199,7 @@ def descend(
     while step > FINEST * limit:
         step /= 3.0
         grid = finer_grid(parents, step, limit)
-        chosen = patterns.scan(grid, start).best(PARENTS, data.min_moves, 1.5 * step)
+        chosen = patterns.scan(grid, start).best(PARENTS, 1.5 * step)
         if not chosen:
             return model
         parents, cells = best_in_cells(patterns, grid[chosen], start)
@@ -222,7 +222,7 @@ def comb(data: Data, model: Model, valve: int) -> Model:
     for _ in range(2):
         grid = finer_grid(grid, step, limit, half)
         scan = search.scan(grid, start)
-        chosen = scan.best(PARENTS, data.min_moves, 2.0 * step)
+        chosen = scan.best(PARENTS, 2.0 * step)
         grid, half, step = grid[chosen], 3, step / 3.0
     for index in chosen[:2]:
         friction, delays = scan.grid[index], scan.delays[index]

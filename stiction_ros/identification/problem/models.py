@@ -17,6 +17,7 @@ from stiction_ros.identification.problem.scan import OutputScan
 from stiction_ros.identification.switching import StepSignals
 
 DELAY_MARGIN = 10.8
+FEWEST_MOVES = 6  # of a stem, from which anything may be concluded
 EQUAL = 3.84
 
 
@@ -40,7 +41,6 @@ class Data:
     law: type[FrictionLaw]  # friction law
     limit: FloatArray  # largest f_S per valve, %, shape (m,)
     delay: tuple[int, int]  # inclusive range of t_d
-    min_moves: int  # fewest stem moves of an accepted candidate
 
     def part(self, begin: int, end: int) -> "Data":
         """Return the samples from ``begin`` to before ``end``."""
@@ -96,9 +96,9 @@ class ValveScan:
     delays: FloatArray  # the best delay per output, shape (G, p)
     moves: FloatArray  # shape (G,)
 
-    def best(self, count: int, min_moves: int, apart: float) -> list[int]:
+    def best(self, count: int, apart: float) -> list[int]:
         """Return up to ``count`` best rows at least ``apart`` from each other."""
-        loss = np.where(self.moves < min_moves, np.inf, self.loss)
+        loss = np.where(self.moves < FEWEST_MOVES, np.inf, self.loss)
         return [int(index) for index in best_apart(self.grid, loss, count, apart)]
 
 

@@ -35,7 +35,6 @@ def prepare(record: Record, options: IdentificationOptions) -> Data:
         law=find_law(options.first_law),
         limit=limited(np.ptp(u, axis=1), options.friction_limit),
         delay=options.delay,
-        min_moves=options.min_moves,
     )
 
 

@@ -163,7 +163,6 @@ def test_nothing_is_gained_where_there_is_no_friction() -> None:
         law=HeStiction,
         limit=np.array([np.ptp(u)]),
         delay=(0, 0),
-        min_moves=3,
     )
     orders = window(IdentificationOptions(output_order=1, input_order=1, delay=(0, 0)), 1, 1)
     model = linear_model(data, orders)
