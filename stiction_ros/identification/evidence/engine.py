@@ -43,7 +43,6 @@ from stiction_ros.identification.problem.models import (
 from stiction_ros.identification.problem.preparation import prepare, windows
 from stiction_ros.identification.result import (
     Identification,
-    OrderRow,
     Stability,
     ValveEstimate,
     VerdictKind,
@@ -126,13 +125,28 @@ def _identification(
     options: IdentificationOptions,
     valves: tuple[ValveEstimate, ...],
 ) -> Identification:
-    """Return the process for the stems of these valves, over the whole record."""
+    """Return the process for the stems of these valves, over the whole record.
+
+    Orders and delays are those of the part. Where the stems were before the part is not known:
+    over the whole they begin at OP.
+    """
     small = data if part is record else prepare(part, options)
-    model, table = _process(small, options, valves, part)
+    friction = np.array([[v.static_friction, v.dynamic_friction] for v in valves])
+    starts = np.array([v.stem_start for v in valves]) - part.op[0]
+    delays = ((small.delay[0],) * len(valves),) * len(small.y)
+    base = Model(friction, starts, _stems(small, valves, starts), delays, ())
+    rivals = [linear_model(small, orders, base) for orders in windows(options)]
+    model, _ = settle_delays(small, min(rivals, key=lambda rival: rival.bic))
     if part is not record:
-        valves, model = _over_all(record, data, valves, model)
-    found = conclude(record, data, model, valves, table)
-    return dataclasses.replace(found, method="evidence")
+        valves = tuple(
+            dataclasses.replace(valve, stem_start=float(op))
+            for valve, op in zip(valves, record.op[0], strict=True)
+        )
+        nowhere = np.zeros(len(valves))
+        whole = dataclasses.replace(model, start=nowhere, stems=_stems(data, valves, nowhere))
+        model = refit(data, whole, model.orders, warm=False)
+    table = tuple(order_row(rival) for rival in rivals)
+    return dataclasses.replace(conclude(record, data, model, valves, table), method="evidence")
 
 
 def _estimate(
@@ -217,22 +231,6 @@ def _stability(
     return Stability((*views, *halves(gains, PRICE if healthy else None)))
 
 
-def _over_all(
-    record: Record, data: Data, valves: tuple[ValveEstimate, ...], found: Model
-) -> tuple[tuple[ValveEstimate, ...], Model]:
-    """Return what a part of a record has shown for all of it, the process fitted anew.
-
-    Where the stems were before the part is not known: they begin at OP.
-    """
-    first = (float(op) for op in record.op[0])
-    valves = tuple(
-        dataclasses.replace(valve, stem_start=op) for valve, op in zip(valves, first, strict=True)
-    )
-    nowhere = np.zeros(len(valves))
-    model = dataclasses.replace(found, start=nowhere, stems=_stems(data, valves, nowhere))
-    return valves, refit(data, model, found.orders, warm=False)
-
-
 def _stems(data: Data, valves: tuple[ValveEstimate, ...], starts: FloatArray) -> FloatArray:
     """Return the stems of valves, each by its own law, shape (m, N)."""
     stems = data.u.copy()
@@ -243,17 +241,3 @@ def _stems(data: Data, valves: tuple[ValveEstimate, ...], starts: FloatArray) ->
             further = valve.further_values
             stems[j] = simulate(law, friction, op, float(op[0] + starts[j]), further)[:, 0]
     return stems
-
-
-def _process(
-    data: Data, options: IdentificationOptions, valves: tuple[ValveEstimate, ...], record: Record
-) -> tuple[Model, tuple[OrderRow, ...]]:
-    """Return orders, delays and linear parts for the stems, and all orders that were tried."""
-    friction = np.array([[v.static_friction, v.dynamic_friction] for v in valves])
-    starts = np.array([v.stem_start for v in valves]) - record.op[0]
-    stems = _stems(data, valves, starts)
-    delays = ((data.delay[0],) * len(valves),) * len(data.y)
-    base = Model(friction, starts, stems, delays, ())
-    rivals = [linear_model(data, orders, base) for orders in windows(options)]
-    model, _ = settle_delays(data, min(rivals, key=lambda rival: rival.bic))
-    return model, tuple(order_row(rival) for rival in rivals)

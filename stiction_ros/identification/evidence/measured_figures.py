@@ -13,6 +13,7 @@ from stiction_ros.identification.evidence.fit_problem import NOISE_ORDER, Proble
 from stiction_ros.identification.evidence.output_fit import fit_output
 from stiction_ros.identification.evidence.rates import Agreement, Look
 from stiction_ros.identification.judgement import Figures
+from stiction_ros.records.valve_work import ValveWork
 from stiction_ros.signals.autoregression import innovations
 from stiction_ros.signals.oscillation import turnings
 
@@ -104,25 +105,19 @@ def figures_of(
     loop = closed.valves[valve]
     beyond = 0.5 * min(agreed.gain, 2.0 * max(gains))
     low, high = agreed.look.accepted[valve].band
+    stem = agreed.look.found.best.stems[valve]
     unevenness, kurtosis = shape_of(seen[0].problem.op[valve])
     return Figures(
         gain=beyond if agreed.alike else min(beyond, 0.0),
         ruled_out=-max(material),
         repeats=0.5 * repeated / (max(gains) + FEW),
         loop_gone=loop.gone,
-        stem_rest=agreed.look.problem.rows / max(_runs(agreed.look.found.best.stems[valve]), 1),
+        stem_rest=agreed.look.problem.rows / (ValveWork.of(stem).reversals + 1.0),
         controller_fit=0.0 if loop.controller is None else loop.controller.r_squared,
         band_width=1.0 - low / high if high > 0.0 else 0.0,
         op_unevenness=unevenness,
         op_kurtosis=kurtosis,
     )
-
-
-def _runs(stem: FloatArray) -> int:
-    """Return how many times a stem, shape (n,), moves on in one direction before it turns."""
-    ways = np.sign(np.diff(stem))
-    ways = ways[ways != 0.0]
-    return int(np.count_nonzero(np.diff(ways))) + min(len(ways), 1)
 
 
 def shape_of(op: FloatArray) -> tuple[float, float]:
