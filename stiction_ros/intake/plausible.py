@@ -13,8 +13,7 @@ from stiction_ros.intake.intake_options import TO_PERCENT, OpUnit, known_op_unit
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.tables.block import Block, Column
 from stiction_ros.intake.words import WORDS
-from stiction_ros.signals.tracking import nearness
-from stiction_ros.signals.velocity_form import explained
+from stiction_ros.signals.tracking import explained, nearness
 
 PERCENT = (-10.0, 110.0)  # what an OP in % stays within
 OFTEN = 0.1  # share of the samples outside of that from which it is told

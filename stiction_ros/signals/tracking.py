@@ -1,4 +1,4 @@
-"""Which of two columns follows the set-point."""
+"""Which of two columns follows the set-point, and whether OP moves as a PI law of PV says."""
 
 import numpy as np
 
@@ -32,3 +32,31 @@ def _tracks(error: FloatArray, sp: FloatArray) -> bool:
 
 def _size(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+def terms(error: FloatArray, span: int = 1) -> FloatArray:
+    """Return e_k − e_{k−h} and the sum of the h errors up to e_k, shape (N − h, 2).
+
+    Args:
+        error: e, or PV where the set-point rests, shape (N,).
+        span: h, samples.
+    """
+    sums = np.cumsum(error)
+    return np.column_stack([error[span:] - error[:-span], sums[span:] - sums[:-span]])
+
+
+def explained(op: FloatArray, pvs: FloatArray, span: int = 1) -> float:
+    """Return R² of the moves of OP over ``span`` samples by a PI law of PVs; 0 where it rests.
+
+    Near 1 the set-points hardly moved.
+
+    Args:
+        op: shape (N,).
+        pvs: shape (N, p).
+        span: h, samples.
+    """
+    moves = op[span:] - op[:-span]
+    columns = np.column_stack([*(terms(pv, span) for pv in pvs.T), np.ones(len(moves))])
+    spread = float(((moves - moves.mean()) ** 2).sum())
+    left = moves - columns @ np.linalg.lstsq(columns, moves, rcond=None)[0]
+    return 1.0 - float((left**2).sum()) / spread if spread > 0.0 else 0.0

@@ -7,11 +7,10 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import block_diag, solve_toeplitz
+from scipy.linalg import block_diag, solve_discrete_are, solve_toeplitz
 
 from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.likelihood.slow_noise import NEGLIGIBLE, REMEMBERED, counting
-from stiction_ros.discrepancy.likelihood.state_noise import steady_gain
 from stiction_ros.effects import ColouredDisturbance, FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, NoiseEntry, Process
@@ -224,3 +223,25 @@ def _alike(one: DeclaredNoise, other: DeclaredNoise) -> bool:
     count = max(len(one.ar), len(other.ar))
     apart = np.pad(one.ar, (0, count - len(one.ar))) - np.pad(other.ar, (0, count - len(other.ar)))
     return float(np.abs(apart).max(initial=0.0)) <= NEGLIGIBLE
+
+
+def steady_gain(
+    a: FloatArray, q: FloatArray, c: FloatArray, r: float
+) -> tuple[FloatArray, float] | None:
+    """Return Kalman's gain, shape (n,), and the variance of what its predictions miss.
+
+    None where there is no steady one.
+
+    Args:
+        a, q: of the states, shape (n, n).
+        c: of the one output, shape (n,).
+        r: its variance.
+    """
+    if not len(a):
+        return np.zeros(0), r
+    try:
+        p = solve_discrete_are(a.T, c[:, None], q, np.array([[r]]))
+    except ValueError:  # LinAlgError is one
+        return None
+    missed = float(c @ p @ c) + r
+    return np.asarray(a @ p @ c / missed), missed

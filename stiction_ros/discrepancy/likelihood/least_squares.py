@@ -116,3 +116,16 @@ def _lengths(columns: FloatArray) -> FloatArray:
     """Return the lengths of columns, shape (q,); inf of those that are zero."""
     sizes = np.linalg.norm(columns, axis=0)
     return np.where(sizes > NOTHING, sizes, np.inf)
+
+
+def left_by_columns(white: FloatArray, values: FloatArray, rows: BoolArray) -> FloatArray:
+    """Return what least squares on the marked rows leave of the first one, shape (N,).
+
+    Args:
+        white: a target and its columns, whitened, shape (1 + q, N).
+        values: the same before; a column of which whitening leaves nothing does not count.
+        rows: shape (N,).
+    """
+    after, before = (np.linalg.norm(each[1:, rows], axis=1) for each in (white, values))
+    columns = white[1:][after > ROUNDING * before]
+    return np.asarray(white[0] - coefficients(columns[:, rows], white[0, rows]) @ columns)

@@ -20,7 +20,7 @@ from stiction_ros.identification.linear.subspace import OrderChoice, choose_orde
 from stiction_ros.intake.intake import record_of
 from stiction_ros.records.record import Record
 from stiction_ros.signals.subspace_projection import SubspaceMethod
-from stiction_ros.signals.velocity_form import explained
+from stiction_ros.signals.tracking import explained
 
 CONTROLLER_SHARE = 0.98
 CLOSED_LOOP = (

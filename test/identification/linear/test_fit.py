@@ -16,7 +16,7 @@ from stiction_ros.identification.linear.result import LinearIdentification
 from stiction_ros.loop import LoopModel, prbs_experiment
 from stiction_ros.records.record import Record
 from stiction_ros.signals.subspace_projection import SubspaceMethod
-from stiction_ros.signals.velocity_form import explained
+from stiction_ros.signals.tracking import explained
 
 TANK = LoopModel.load(find_config("tank.loop.yaml")).with_ideal_valves()
 LINEAR_TANK = LoopModel.load(find_config("tank_linear.loop.yaml"))
