@@ -3,6 +3,7 @@
 import argparse
 import dataclasses
 import functools
+import itertools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -132,11 +133,11 @@ def show(rows: "list[Judged]", ablate: bool) -> None:
                 table.add_row(key, f"{value:.3f}")
             console.print(table)
     bins = Table("probability", "loops", "with friction")
-    for k in range(10):
-        inside = [(p, row.friction) for p, row in zip(folds, rows, strict=True) if int(10 * p) == k]
-        if inside:
-            told, true = np.mean(inside, axis=0)
-            bins.add_row(f"{told:.2f}", f"{len(inside)}", f"{true:.2f}")
+    tenths = np.minimum(10.0 * folds, 9.0).astype(int)
+    for k in np.unique(tenths):
+        inside = tenths == k
+        true = np.mean([row.friction for row in itertools.compress(rows, inside)])
+        bins.add_row(f"{folds[inside].mean():.2f}", f"{inside.sum()}", f"{true:.2f}")
     console.print(bins)
     if ablate:
         table = Table("without", "loss, nats a loop", "more")
