@@ -51,9 +51,7 @@ def add(commands: Any) -> None:
         metavar="max|N",
         help="lockstep as fast as possible, or N simulated seconds per second (default: max)",
     )
-    if compare is None:
-        parser.add_argument("--compare", action=extensions.Missing)
-    else:
+    if compare is not None:
         compare.add_options(parser)
     parser.set_defaults(run=run)
 

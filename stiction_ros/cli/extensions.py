@@ -4,7 +4,6 @@ It names a table by an entry point of the group ``stiction.commands``: commands,
 are typed (``demo opcua``), to their module and what ``--help`` says.
 """
 
-import argparse
 import functools
 import importlib
 from collections.abc import Mapping
@@ -51,17 +50,3 @@ def refuse(name: str) -> NoReturn:
         where=f"stiction {name}",
         fix=f"install {STUDIES} beside stiction_ros",
     )
-
-
-class Missing(argparse.Action):
-    """An option that comes with another distribution, which is not installed."""
-
-    def __init__(self, option_strings: Any, dest: str, **_: Any) -> None:
-        """Take no value, and show nothing in ``--help``."""
-        super().__init__(option_strings, dest, nargs=0, default=False, help=argparse.SUPPRESS)
-
-    def __call__(
-        self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option: Any = None
-    ) -> NoReturn:
-        """Raise InputError with what brings it."""
-        refuse(f"{parser.prog.rpartition(' ')[2]} {option}")

@@ -28,7 +28,7 @@ COMMANDS = {
     "report": "a page of a record or of a recorded run",
     "gain": "what service or retuning would bring",
     "valve-test": "a test in manual: its moves, its verdict",
-    "simulate": "run a loop model under its controller or by moves",
+    "simulate": "run a loop model, closed or by moves of OP",
     "fit-linear": "fit a linear model for a controller",
     "replay": "decide over a bag as the nodes did live",
     "demo": "a live loop: cycle, identify, swap, report",
@@ -124,6 +124,9 @@ class _Parser(argparse.ArgumentParser):
 
     def _unknown(self, spare: Sequence[str]) -> str:
         words = [word.partition("=")[0] for word in spare if word.startswith("-")]
+        for word in words:
+            if (part := f"{self.prog.rpartition(' ')[2]} {word}") in extensions.OF_STUDIES:
+                extensions.refuse(part)
         if words:
             told = [f"{word}{_meant(word, self._option_string_actions)}" for word in words]
             return f"unknown option {', '.join(told)}"
