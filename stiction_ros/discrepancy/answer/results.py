@@ -15,7 +15,7 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import OutputGap, OutputNoise
 from stiction_ros.discrepancy.gap.where import Where
 from stiction_ros.discrepancy.simulation.free_run import Runs
-from stiction_ros.effects import Behaviour, Offset, TimeShift, Tuning, behaviours
+from stiction_ros.effects import Behaviour, Offset, Stiction, TimeShift, Tuning, behaviours
 from stiction_ros.loop import LoopModel
 
 ALONE = (
@@ -23,6 +23,7 @@ ALONE = (
     "shows only there is not searched"
 )
 ABSORBED = "the process was fitted to these records, which does as well"
+OTHER_LAWS = "stiction is searched by the laws he and xch"
 NO_ROOM = (
     "these records cannot show it: no signal moves where it acts, or no size of it is possible"
 )
@@ -80,13 +81,14 @@ def _by_other_means(kind: type[Behaviour], controller: ControllerCheck) -> bool:
 def _reason(kind: type[Behaviour], candidates: Sequence[Candidate]) -> str:
     if kind.absorbed and not any(c.absorbed for c in candidates):
         return ABSORBED
-    said = kind.not_searched
-    if said != Behaviour.not_searched:
-        return said
+    if kind.not_searched != Behaviour.not_searched:
+        return kind.not_searched
     names_axes = kind.axes.__func__ is not Behaviour.axes.__func__  # type: ignore[attr-defined]
     home = kind.__module__
     shipped = home.startswith("stiction_ros.effects.") and ".effects.own." not in home
-    return NO_ROOM if names_axes or shipped else said
+    if shipped and issubclass(kind, Stiction):
+        return OTHER_LAWS
+    return NO_ROOM if names_axes or shipped else kind.not_searched
 
 
 @dataclasses.dataclass(frozen=True)

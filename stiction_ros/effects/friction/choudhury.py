@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from stiction_ros.effects.behaviour import Memory
 from stiction_ros.effects.friction.moving_rules import SlopeRules
-from stiction_ros.effects.friction.stiction import NOT_SEARCHED, JumpForm, SlipJumpPair, Switching
+from stiction_ros.effects.friction.stiction import JumpForm, SlipJumpPair, Switching
 
 MOVING = -1.0  # a threshold that every |u − x_ss| exceeds
 
@@ -43,7 +43,6 @@ class ChoudhuryStiction(SlipJumpPair):
     """
 
     law: ClassVar[str | None] = "choudhury"
-    not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching] = SlopeRules
     kernel: ClassVar[str] = "choudhury_stems"
 

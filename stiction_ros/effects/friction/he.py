@@ -4,13 +4,7 @@ import dataclasses
 from typing import ClassVar
 
 from stiction_ros.effects.behaviour import Memory
-from stiction_ros.effects.friction.stiction import (
-    NOT_SEARCHED,
-    SLIPS,
-    FrictionPair,
-    JumpForm,
-    Switching,
-)
+from stiction_ros.effects.friction.stiction import SLIPS, FrictionPair, JumpForm, Switching
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,7 +30,6 @@ class HeStiction(FrictionPair):
     """
 
     law: ClassVar[str | None] = "he"
-    not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching] = SLIPS
     kernel: ClassVar[str] = "he_stems"
 

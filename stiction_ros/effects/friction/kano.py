@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from stiction_ros.effects.behaviour import FloatArray, Memory
 from stiction_ros.effects.friction.moving_rules import MovingRules
-from stiction_ros.effects.friction.stiction import NOT_SEARCHED, JumpForm, SlipJumpPair, Switching
+from stiction_ros.effects.friction.stiction import JumpForm, SlipJumpPair, Switching
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,7 +41,6 @@ class KanoStiction(SlipJumpPair):
     """
 
     law: ClassVar[str | None] = "kano"
-    not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching] = MovingRules
     kernel: ClassVar[str] = "following_stems"
 

@@ -5,7 +5,7 @@ import math
 from typing import Any, ClassVar
 
 from stiction_ros.effects.behaviour import Memory, parameter
-from stiction_ros.effects.friction.stiction import NOT_SEARCHED, SlipJumpPair
+from stiction_ros.effects.friction.stiction import SlipJumpPair
 
 REST = 10.0  # OP that moves by less than REST / τ in a sample rests
 
@@ -40,7 +40,6 @@ class SmoothedKanoStiction(SlipJumpPair):
     """
 
     law: ClassVar[str | None] = "kano_smoothed"
-    not_searched: ClassVar[str] = NOT_SEARCHED
     not_identified: ClassVar[str] = (
         "its smoothed switches are for optimisers, its signature is that of kano"
     )

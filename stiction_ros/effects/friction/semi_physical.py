@@ -4,7 +4,7 @@ import dataclasses
 from typing import ClassVar
 
 from stiction_ros.effects.behaviour import Memory, parameter
-from stiction_ros.effects.friction.stiction import NOT_SEARCHED, FrictionPair, JumpForm
+from stiction_ros.effects.friction.stiction import FrictionPair, JumpForm
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,7 +40,6 @@ class SemiPhysicalStiction(FrictionPair):
     """
 
     law: ClassVar[str | None] = "semi_physical"
-    not_searched: ClassVar[str] = NOT_SEARCHED
     held: ClassVar[tuple[str, ...]] = ("k",)  # as published; every slip hangs on its last digits
     kernel: ClassVar[str] = "semi_physical_stems"
 

@@ -18,7 +18,6 @@ from stiction_ros.errors import InputError
 SLIPS = "slips"  # the switching of He's law: a rectangle of J and S for each pattern of slips
 Switching = str | type[MovingRules] | None
 LEAST_MARGIN = 1e-4  # %; an error of exactly f_S does not slip
-NOT_SEARCHED = "stiction is searched by the laws he and xch"  # what the laws here say to the gap
 
 
 @dataclasses.dataclass(frozen=True)

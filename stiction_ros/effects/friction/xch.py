@@ -6,7 +6,7 @@ from typing import ClassVar
 from stiction_ros.effects.behaviour import Memory
 from stiction_ros.effects.friction.kano import follow
 from stiction_ros.effects.friction.moving_rules import MovingRules
-from stiction_ros.effects.friction.stiction import NOT_SEARCHED, FrictionPair, JumpForm, Switching
+from stiction_ros.effects.friction.stiction import FrictionPair, JumpForm, Switching
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,7 +41,6 @@ class XchStiction(FrictionPair):
     """
 
     law: ClassVar[str | None] = "xch"
-    not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching] = MovingRules
     kernel: ClassVar[str] = "following_stems"
 
