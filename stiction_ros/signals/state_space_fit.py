@@ -132,19 +132,6 @@ def refine(model: Realisation, u: FloatArray, y: FloatArray, one_step: bool) -> 
     )
 
 
-def with_initial_state(model: Realisation, u: FloatArray, y: FloatArray) -> Realisation:
-    """Return ``model`` with the ξ_0 that fits its free run best; unchanged when unstable."""
-    if model.radius >= 1.0:
-        return model
-    n, samples = len(model.a), y.shape[1]
-    drives = np.zeros((samples, n, n + 1))
-    drives[:, :, -1] = (model.b @ u).T
-    run = responses(model.a, model.c, drives, np.eye(n, n + 1))
-    target, columns = y.T - model.y0 - run[:, :, -1], run[:, :, :-1].reshape(-1, n)
-    x0 = np.linalg.lstsq(columns, target.ravel(), rcond=1e-10)[0]
-    return dataclasses.replace(model, x0=np.asarray(x0, dtype=float))
-
-
 def predict(model: Realisation, u: FloatArray, y: FloatArray, one_step: bool) -> FloatArray:
     """Return ŷ, shape (p, N): in free run, or one step ahead with the gain K."""
     transition = model.a - model.k @ model.c if one_step else model.a

@@ -28,7 +28,6 @@ from stiction_ros.signals.state_space_fit import (
     realise,
     refine,
     with_best_gain,
-    with_initial_state,
 )
 from stiction_ros.signals.subspace_projection import StateSequence, SubspaceMethod, state_sequence
 
@@ -164,7 +163,7 @@ def _rival(
     model = refine(with_best_gain(model, sequence, u, y), u, y, one_step)
     if model.radius >= 1.0 and not one_step:
         model = refine(model, u, y, True)
-    model = with_initial_state(with_best_gain(model, sequence, u, y), u, y)
+    model = with_best_gain(model, sequence, u, y)
     p, first = len(y), sequence.horizon
     ahead, free = (predict(model, u, y, flag) for flag in (True, False))
     with np.errstate(over="ignore", invalid="ignore"):
