@@ -219,15 +219,14 @@ class _Search:
 
         halton = halton_sequence(len(self.candidate.axes), seed=0)
         white = dict.fromkeys(range(len(self.base.noise)), NO_MEMORY)
-        for blurred in (True, False):
-            under = white if blurred else self._searched(self.found)
+        for under in (white, None):
             leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:LEADERS]
             first = halton.random(BRED)
             first[: len(leading)] = [self.needle.cube(fit.point) for fit in leading]
             found = differential_evolution(
                 self._loss,
                 [(0.0, 1.0)] * len(self.candidate.axes),
-                args=(under,),
+                args=(under or self._searched(self.found),),
                 strategy="rand1bin",
                 init=first,
                 maxiter=GENERATIONS,

@@ -225,6 +225,7 @@ def _alike(one: DeclaredNoise, other: DeclaredNoise) -> bool:
     return float(np.abs(apart).max(initial=0.0)) <= NEGLIGIBLE
 
 
+@np.errstate(invalid="ignore")  # SciPy scales by 0 where there is no steady gain
 def steady_gain(
     a: FloatArray, q: FloatArray, c: FloatArray, r: float
 ) -> tuple[FloatArray, float] | None:
