@@ -7,7 +7,6 @@ from typing import Any
 
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
@@ -75,22 +74,13 @@ class ManagedNode(LifecycleNode):
         log: RcutilsLogger = self.get_logger()
         return log
 
-    def create_timer(
-        self,
-        timer_period_sec: float,
-        callback: Callable[[], None],
-        callback_group: CallbackGroup | None = None,
-        clock: Clock | None = None,
-        autostart: bool = True,
-    ) -> Timer:
-        """Create a timer on a steady clock: simulated time that stands still stops no node."""
-        clock = clock or self._steady
-        return super().create_timer(timer_period_sec, callback, callback_group, clock, autostart)
-
     def every(self, period: float, name: str, work: Callable[[], None]) -> None:
-        """Do ``work`` every ``period`` s, in place of what had this name, until :meth:`never`."""
+        """Do ``work`` every ``period`` s, in place of what had this name, until :meth:`never`.
+
+        The clock is a steady one: simulated time that stands still stops no node.
+        """
         self.never(name)
-        self.regular[name] = self.create_timer(period, work)
+        self.regular[name] = self.create_timer(period, work, clock=self._steady)
 
     def never(self, name: str) -> None:
         """End what is done regularly under a name, if anything is."""
