@@ -12,6 +12,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Header, McapRecord, Message, Metadata, Schema
 
 from stiction_ros import __version__
+from stiction_ros.checks import one_of
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.finish import ROSBAG2, finish_bag, metadata_record, storage_path
 from stiction_ros.records.bag.run_metadata import RUN, news
@@ -123,6 +124,7 @@ class BagWriter:
         chunk_size: int = 1 << 18,
     ) -> None:
         self.directory = Path(directory)
+        one_of(compression, ("zstd", "lz4", "none"), "compression")
         self._packing = compression, chunk_size
         self._splitting = splitting
         self._limited = splitting.size > 0 or splitting.duration > 0

@@ -209,6 +209,12 @@ def test_refuses_what_is_there(bag: Bag, tmp_path: Path) -> None:
     BagWriter(tmp_path / "empty").close()
 
 
+def test_refuses_an_unknown_packing_before_anything_is_written(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="compression"):
+        BagWriter(tmp_path / "run", "gzip")
+    assert not (tmp_path / "run").exists()
+
+
 def test_an_empty_bag_opens(tmp_path: Path) -> None:
     BagWriter(tmp_path / "nothing").close()
     assert list(read_raw(tmp_path / "nothing")) == []
