@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
 def _run_scenario(
     scenario: "Scenario | UnitScenario", directory: Path, options: argparse.Namespace, show: Bar
 ) -> bool:
-    """Run one scenario and print its table; return whether it succeeded."""
+    """Run one scenario and print what its page says first; return whether it succeeded."""
     from stiction_ros.online.session import Scenario
     from stiction_ros.records.run.log import read_run
     from stiction_ros.report.run.report import report_run

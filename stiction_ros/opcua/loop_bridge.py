@@ -340,7 +340,7 @@ class LoopBridge:
 
 
 def all_grant(modes: Iterable[TagReading], granted: Sequence[str]) -> bool:
-    """Return whether each of the ``modes`` is of good quality and one that grants writing."""
+    """Return whether every mode has good quality and is one of those that grant writing."""
     return all(one.quality is TagQuality.GOOD and mode_text(one.value) in granted for one in modes)
 
 

@@ -41,7 +41,7 @@ def _read(kind: type[Any], section: Section) -> Any:
 
 
 def _text(pattern: str, what: str, fix: str) -> Callable[[Section, str], str]:
-    """Return what reads a text of one form; of another it is no such ``what``, and to be mended."""
+    """Return a function that reads a text of this form; any other text is no ``what``."""
 
     def read(section: Section, key: str) -> str:
         text = section.text(key)

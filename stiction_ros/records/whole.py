@@ -84,7 +84,7 @@ class Whole:
         return [regular_part(self.time, a, b) for a, b in edges if b - a > 1]
 
     def _record(self, part: Part) -> Record:
-        """Return a part as a record, its notes telling of its times and of what it lacks."""
+        """Return a part as a record; notes tell how its times were mended and what was missing."""
         step, more = sample_time(part.time, self.where, lambda row: self.place(part.first + row))
         rows = part.rows
         empty = np.diff(rows, prepend=-1) == 0  # times without a row

@@ -219,7 +219,7 @@ class _Search:
 
         halton = halton_sequence(len(self.candidate.axes), seed=0)
         white = dict.fromkeys(range(len(self.base.noise)), NO_MEMORY)
-        for under in (white, None):
+        for under in (white, None):  # None: under the noise of the best fit so far
             leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:LEADERS]
             first = halton.random(BRED)
             first[: len(leading)] = [self.needle.cube(fit.point) for fit in leading]

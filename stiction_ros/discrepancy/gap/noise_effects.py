@@ -143,8 +143,8 @@ class _Judge:
     def lattice(self, law: Law) -> tuple[FloatArray, list[_Score]]:
         """Return the figures that the likelihood does not reject, and some about them.
 
-        Each lattice lies about what the one before has left, by a bound that falls to the last
-        one's: what is coarse misses the bottom of a narrow valley.
+        Each lattice covers the figures that the lattice before did not reject. A coarse lattice
+        misses the bottom of a narrow valley, so coarse lattices reject less than fine ones.
         """
         low, high = law.range
         for turn in reversed(range(LATTICES)):

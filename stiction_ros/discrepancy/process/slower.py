@@ -188,10 +188,8 @@ class Changeable:
             return self._of_means(gain, late, stretches)
         b, delays, poles = {}, {}, self._poles
         for valve, plant in self._plants.items():
-            delay, led = (
-                self.own.delay[valve],
-                self._factors(values, LEAD, valve, len(zeros_of(plant))),
-            )
+            delay = self.own.delay[valve]
+            led = self._factors(values, LEAD, valve, len(zeros_of(plant)))
             other, more = later(slower(plant, stretches, led), max(late, -float(delay)))
             poles = np.exp(other.poles)
             b[valve] = gain * other.sampled()

@@ -195,7 +195,7 @@ class Peers:
     def _silent(
         self, asked: Sequence[str], found: Sequence[TopicEndpointInfo], what: str
     ) -> list[str]:
-        """Return the partners among those ``asked`` that are not at a topic, and ``what`` lacks."""
+        """Return each ``asked`` partner that is not at a topic, with ``what`` it does not do."""
         names = {info.node_name for info in found}
         away = [n for n in self.names if known_as(n) in asked and _last(n) not in names]
         return self._told(away, what)
