@@ -55,3 +55,13 @@ def spoken(seconds: float | None) -> str:
         return f"{seconds:.3g} s" if seconds < 1000.0 else f"{seconds:.0f} s"
     size, unit = (HOUR, "h") if seconds < 2.0 * DAY else (DAY, "d")
     return f"{seconds / size:.3g} {unit}"
+
+
+def moment(seconds: float | None) -> str:
+    """Return a time on the clock of a run to the second, as moments are compared; a dash for none.
+
+    Examples:
+        >>> moment(5000.2), moment(None)
+        ('5000 s', '–')
+    """
+    return "–" if seconds is None else f"{seconds:.0f} s"

@@ -17,7 +17,7 @@ from stiction_ros.report.run.story import Story, tell
 from stiction_ros.report.run.summary import summary
 from stiction_ros.signals.oscillation import amplitude, pieces
 from stiction_ros.survey.neighbours import Neighbours, is_outer, neighbours
-from stiction_ros.texts import spoken
+from stiction_ros.texts import moment
 
 UNIT_COLUMNS = (
     *("loop", "valve", "verdict", "cycles by", "period, s", "behind, s"),
@@ -78,7 +78,7 @@ def unit_page(report: UnitReport) -> str:
     """Return the report of several loops as HTML."""
     headline, *said = report.found.sentences
     if report.swapped:
-        at = spoken(report.stories[report.swapped].swap_time)
+        at = moment(report.stories[report.swapped].swap_time)
         said.append(f"After {at} the controller of {report.swapped} was swapped.")
     parts = [
         f"<h1>{text(headline)}</h1>",

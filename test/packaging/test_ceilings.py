@@ -9,7 +9,7 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LINES = 61_947
+LINES = 61_957
 LINES_OF_STUDIES = 22_952
 NUMERIC_CONSTANTS = 813
 

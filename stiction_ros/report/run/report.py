@@ -25,7 +25,7 @@ from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import Story, tell
 from stiction_ros.report.run.summary import measured, messages, summary, work_rows
-from stiction_ros.texts import spoken
+from stiction_ros.texts import moment, spoken
 
 _SCORES = (
     ("amplitude", "amplitude of the cycle", ""),
@@ -94,7 +94,7 @@ def mode_lines(story: Story) -> list[str]:
         ]
         with_known = f", on trusting for {'; for '.join(known)}" if known else ""
         lines.append(
-            f"After {spoken(story.swap_time)} the controller changed from unaware to "
+            f"After {moment(story.swap_time)} the controller changed from unaware to "
             f"{swap.mode} between two samples{with_known}."
         )
         lines += _later_changes(story, swap)
@@ -112,7 +112,7 @@ def _later_changes(story: Story, swap: ModeChange) -> list[str]:
         if change.mode == mode:
             renewed += 1
             continue
-        at, mode = spoken(story.log.seconds(change.stamp)), change.mode
+        at, mode = moment(story.log.seconds(change.stamp)), change.mode
         lines.append(f"After {at} it changed to {mode}: {change.reason}.")
     if renewed:
         times = {1: "once", 2: "twice"}.get(renewed, f"{renewed} times")
@@ -211,7 +211,7 @@ def _spans(story: Story) -> str:
     said = []
     for name, phase in (("Before", before), ("after", after)):
         if phase is not None:
-            first, last = spoken(phase.first * step), spoken(phase.last * step)
+            first, last = moment(phase.first * step), moment(phase.last * step)
             said.append(f"{name}: {first if phase.first else 'start'} to {last}")
     text_ = "; ".join(said) + "."
     if after is not None and story.round_samples is None:
@@ -242,7 +242,7 @@ def _fits(story: Story) -> str:
             trusted = [percent(fit.trusted.get(f"{name}.{key}")) for key in ("f_s", "f_d")]
             rows.append(
                 [
-                    spoken(log.seconds(fit.stamp)),
+                    moment(log.seconds(fit.stamp)),
                     name,
                     (identified.KINDS.get(verdict, ""), verdict),
                     percent(valve["f_s"]),
@@ -318,7 +318,7 @@ def monitor_section(log: RunLog) -> str:
         outputs = look.get("outputs", {})
         rows.append(
             [
-                spoken(log.seconds(stamp)),
+                moment(log.seconds(stamp)),
                 ("bad", "grown") if look.get("grown") else "as in the baseline",
                 str(found.get("text", "")) or str(look.get("failure", "")),
                 ", ".join(f"{name} {_growth(one)}" for name, one in outputs.items()),
