@@ -1,5 +1,6 @@
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -11,12 +12,14 @@ from stiction_ros.records.bag.message_definitions import default_prefixes, defin
 SEPARATOR = "\n" + "=" * 80 + "\n"
 
 
-def package(prefix: Path, name: str, messages: dict[str, str]) -> None:
+def package(prefix: Path, name: str, messages: dict[str, str], needed: Sequence[str] = ()) -> None:
+    """Write messages that all need some others, as the file of hashes beside each tells."""
     folder = prefix / "share" / name / "msg"
     folder.mkdir(parents=True)
     for key, text in messages.items():
         (folder / f"{key}.msg").write_text(text)
-        hashes = [{"type_name": f"{name}/msg/{key}", "hash_string": f"RIHS01_{key}"}]
+        every = [f"{name}/msg/{key}", *needed]
+        hashes = [{"type_name": n, "hash_string": f"RIHS01_{n.split('/')[-1]}"} for n in every]
         (folder / f"{key}.json").write_text(json.dumps({"type_hashes": hashes}))
 
 
@@ -26,20 +29,14 @@ def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_dependencies_follow_once_each(tmp_path: Path) -> None:
-    package(
-        tmp_path,
-        "a",
-        {
-            "Top": "uint8 OK=0  # x/Y\nb/Low[] lows\nInner<=3 no\nInner[<=4] inner\nstring<=9 s\n",
-            "Inner": "b/Low low\nfloat64[3] x\n",
-        },
-    )
+    package(tmp_path, "a", {"Top": "b/Low[] lows\n"}, ["a/msg/Inner", "b/msg/Low"])
+    (tmp_path / "share/a/msg/Inner.msg").write_text("b/Low low\n")
     package(tmp_path, "b", {"Low": "int32 x\n"})
     text, type_hash = definition("a/msg/Top")
-    parts = text.split(SEPARATOR)
-    assert [part.split("\n")[0] for part in parts[1:]] == ["MSG: b/Low", "MSG: a/Inner"]
+    assert text.split(SEPARATOR) == [
+        "b/Low[] lows\n", "MSG: a/Inner\nb/Low low\n", "MSG: b/Low\nint32 x\n"
+    ]  # fmt: skip
     assert type_hash == "RIHS01_Top"
-    assert definition("a/Top")[0] == text
 
 
 def test_errors_name_the_type_and_the_fix(tmp_path: Path) -> None:
