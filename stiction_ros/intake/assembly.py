@@ -12,7 +12,7 @@ from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake import repairs
 from stiction_ros.intake.clocks import put_right
 from stiction_ros.intake.intake_options import IntakeOptions
-from stiction_ros.intake.loop import Loop, columns_of, modes_of, spreads_of
+from stiction_ros.intake.loop import Loop, signals_of_blocks
 from stiction_ros.intake.modes import manual_marked
 from stiction_ros.intake.plausible import in_percent, refuse_swapped, refuse_twice
 from stiction_ros.intake.reported import at_pv, is_reported, on_grid
@@ -74,13 +74,7 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
 def unread(found: Found, problem: str | None, modes: Mapping[str, str] = {}) -> Loop:
     """Return a loop without records, with what stands in its columns, and the ``modes`` known."""
     return Loop(
-        found.name,
-        found.files,
-        (),
-        problem=problem,
-        columns=columns_of(found.blocks),
-        spreads=spreads_of(found.blocks),
-        modes=modes_of(found.blocks, modes),
+        found.name, found.files, (), problem=problem, signals=signals_of_blocks(found.blocks, modes)
     )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.assembly import Found, loop_of, unread
 from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions
-from stiction_ros.intake.loop import Loop, spreads_of_records
+from stiction_ros.intake.loop import Loop, signals_of_records
 from stiction_ros.intake.sheets.sheet import SUFFIXES, Sheet, stem
 from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.intake.tables.block import Block
@@ -202,7 +202,7 @@ def _bags(path: Path, options: IntakeOptions) -> Iterator[Loop]:
             yield Loop(name, (path,), (), problem=str(read))
             continue
         notes = tuple(dict.fromkeys(note for part in read for note in part.notes))
-        yield Loop(name, (path,), read, notes, spreads=spreads_of_records(read))
+        yield Loop(name, (path,), read, notes, signals=signals_of_records(read))
 
 
 def _with_names_of_their_own(found: Iterator[Loop]) -> Iterator[Loop]:

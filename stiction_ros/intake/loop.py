@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.intake.repairs import outside
-from stiction_ros.intake.tables.block import Block, Key
+from stiction_ros.intake.tables.block import Block, Column, Key
 from stiction_ros.records.parts import span
 from stiction_ros.records.record import Record
 
@@ -25,12 +25,10 @@ class Loop:
     parts: tuple[Record, ...]
     notes: tuple[str, ...] = ()  # what was masked, held, cut, converted; the records bear the same
     problem: str | None = None  # why it cannot be read and what helps; None when it can be
-    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)  # of each signal, or tag
     op_unit: str = "%"  # what OP is in; OP of a share or a current has been brought to %
-    # signal to the least, largest and median number of its column, in words and in the column's own
-    # unit; of bags OP in %
-    spreads: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    modes: tuple[str, ...] = ()  # words of the mode, each with its count and what it is taken for
+    # each signal with its column, and the least, largest and median number there in the column's
+    # own unit, or the words of the mode; of bags OP in %
+    signals: tuple[str, ...] = ()
 
     @property
     def summary(self) -> str:
@@ -46,53 +44,47 @@ class Loop:
         )
 
 
-def named(key: Key) -> str:
-    """Return a signal as it is called for people: ``OP FIC101``."""
-    return f"{key.signal.upper()} {key.tag}".strip()
+def signals_of_blocks(blocks: Sequence[Block], modes: Mapping[str, str]) -> tuple[str, ...]:
+    """Return each signal of a loop with its column, and the numbers or words that stand there.
 
-
-def columns_of(blocks: Sequence[Block]) -> dict[str, str]:
-    """Return signal to the column that it stands in."""
-    return {named(key): column.name for one in blocks for key, column in one.columns.items()}
-
-
-def spreads_of(blocks: Sequence[Block]) -> dict[str, str]:
-    """Return what numbers each signal of a loop has, without those far outside all others."""
-    measured = (item for block in blocks for item in block.measured.items())
-    return _spreads((named(key), column.values) for key, column in measured)
-
-
-def spreads_of_records(parts: Sequence[Record]) -> dict[str, str]:
-    """Return the same of records, whose OP is in %."""
-    signals = [(part, key, values) for part in parts for key, values in part.signals.items()]
-    return _spreads(
-        (f"{key.upper()} {tag}", column)
-        for part, key, values in signals
-        for tag, column in zip(part.tags(key), values.T, strict=True)
+    What the words of a mode are taken for is said by ``modes``, where it is known.
+    """
+    every: dict[Key, list[Column]] = {}
+    for key, column in ((k, c) for block in blocks for k, c in block.columns.items()):
+        every.setdefault(key, []).append(column)
+    return tuple(
+        f"{key.signal.upper()} {key.tag}".strip() + f" from {columns[-1].name}"
+        f"{_words(columns, modes) if key.signal == 'mode' else _spread(c.values for c in columns)}"
+        for key, columns in every.items()
     )
 
 
-def modes_of(blocks: Sequence[Block], taken: Mapping[str, str]) -> tuple[str, ...]:
-    """Return words of the mode, most frequent first, with count and what each is ``taken`` for."""
+def signals_of_records(parts: Sequence[Record]) -> tuple[str, ...]:
+    """Return the same of records, whose OP is in %."""
+    every: dict[str, list[FloatArray]] = {}
+    for part, key, values in ((p, k, v) for p in parts for k, v in p.signals.items()):
+        for tag, column in zip(part.tags(key), values.T, strict=True):
+            every.setdefault(f"{key.upper()} {tag}", []).append(column)
+    return tuple(f"{name}{_spread(pieces)}" for name, pieces in every.items())
+
+
+def _words(columns: Sequence[Column], taken: Mapping[str, str]) -> str:
+    """Return words of a mode, most frequent first, with count and what each is ``taken`` for."""
     counts: Counter[str] = Counter()
-    for block in blocks:
-        for column in block.of("mode").values():
-            codes = column.values[np.isfinite(column.values)].astype(np.intp)
-            counts.update(column.known[code] for code in codes.tolist())
-    return tuple(
+    for column in columns:
+        codes = column.values[np.isfinite(column.values)].astype(np.intp)
+        counts.update(column.known[code] for code in codes.tolist())
+    told = (
         f"{count} {word or 'empty'}{f' ({taken[word]})' if word in taken else ''}"
         for word, count in counts.most_common()
     )
+    return f": {', '.join(told)}" if counts else ""
 
 
-def _spreads(signals: Iterable[tuple[str, FloatArray]]) -> dict[str, str]:
-    pieces: dict[str, list[FloatArray]] = {}
-    for name, values in signals:
-        pieces.setdefault(name, []).append(values)
-    found = {}
-    for name, values in ((name, np.concatenate(some)) for name, some in pieces.items()):
-        usual = values[np.isfinite(values) & ~outside(values)]
-        if len(usual):
-            middle = np.median(usual)
-            found[name] = f"{usual.min():.4g} to {usual.max():.4g}, median {middle:.4g}"
-    return found
+def _spread(pieces: Iterable[FloatArray]) -> str:
+    """Return least, largest and median of numbers, without those far outside all others."""
+    values = np.concatenate(list(pieces))
+    usual = values[np.isfinite(values) & ~outside(values)]
+    if not len(usual):
+        return ""
+    return f": {usual.min():.4g} to {usual.max():.4g}, median {np.median(usual):.4g}"

@@ -112,7 +112,7 @@ def test_a_mode_that_says_nothing_is_told(tmp_path: Path) -> None:
     loop = one(path)
     assert "MODE shows RUN7 alone, which is not known: taken as automatic" in said(loop)
     assert "--auto WORD" in said(loop)
-    assert loop.modes == ("120 RUN7 (automatic)",)
+    assert loop.signals[-1] == "MODE from MODE: 120 RUN7 (automatic)"
     assert "RUN7" not in said(one(path, automatic=("RUN7",)))
 
 

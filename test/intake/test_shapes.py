@@ -233,7 +233,11 @@ def test_tags_above_columns_that_are_all_called_value(tmp_path: Path) -> None:
     rows = shifted(["Timestamp", "Value", "Timestamp", "Value", "Timestamp", "Value"])
     loop = one(write(tmp_path / "a.csv", tags + rows))
     check_shifted(loop)
-    assert set(loop.columns.values()) == {"F.PV", "F.OP", "F.SP"}
+    assert {said.split(" from ")[1].split(":")[0] for said in loop.signals} == {
+        "F.PV",
+        "F.OP",
+        "F.SP",
+    }
 
 
 def test_one_value_a_row_with_date_and_time_of_day(tmp_path: Path) -> None:

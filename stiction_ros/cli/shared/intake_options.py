@@ -3,7 +3,7 @@
 import argparse
 import csv
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from stiction_ros.errors import InputError
@@ -158,7 +158,7 @@ def dry_run(options: argparse.Namespace) -> int:
         files = ", ".join(file.name for file in loop.files)
         said = loop.summary if loop.problem is None else f"not read: {loop.problem}"
         print(f"{loop.name} ({files}): {said}")
-        for line in _signals(loop):
+        for line in loop.signals:
             print(f"  {line}")
         for note in loop.notes:
             print(f"  note: {note}")
@@ -173,14 +173,6 @@ def tell_strangers(file: str | Path | None, what: str, names: Sequence[str]) -> 
     if names:
         more = " and others" if len(names) > OTHERS else ""
         print(f"{file}: no {what} is called {', '.join(names[:OTHERS])}{more}", file=sys.stderr)
-
-
-def _signals(loop: Loop) -> Iterator[str]:
-    """Yield where each signal comes from and what stands there."""
-    for signal in dict.fromkeys((*loop.columns, *loop.spreads)):
-        origin = f" from {loop.columns[signal]}" if signal in loop.columns else ""
-        spread = loop.spreads.get(signal, ", ".join(loop.modes) if signal == "MODE" else "")
-        yield f"{signal}{origin}{f': {spread}' if spread else ''}"
 
 
 def tell(loop: Loop) -> None:
