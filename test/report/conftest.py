@@ -7,7 +7,7 @@ import pytest
 
 from stiction_ros.loop import LoopModel
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.events import Estimate, Fit, ModeChange, Text
+from stiction_ros.records.run.events import Fit, ModeChange, Text
 from stiction_ros.records.run.log import RunLog
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "survey"))
@@ -86,7 +86,6 @@ def log() -> RunLog:
     return RunLog(
         record,
         first,
-        tuple(Estimate(s, f"V1.{n}", 4.0, 3.9, float("nan")) for s in at for n in ("f_s", "f_d")),
         (
             ModeChange(first, "unaware", "made_up", "start"),
             ModeChange(first + SWAP * SECOND, "embedding", "made_up", "friction", known),

@@ -73,7 +73,7 @@ def test_healthy_valves_are_no_trouble(healthy: RunLog, tmp_path: Path) -> None:
 
 def test_a_bag_with_nothing_but_the_signals(log: RunLog, tmp_path: Path) -> None:
     record = dataclasses.replace(log.record, sp=None, stem=None)
-    bare = RunLog(record, log.start, (), (), (), (), {"/pv": 1200}, {})
+    bare = RunLog(record, log.start, (), (), (), {"/pv": 1200}, {})
     written = report_run(bare, tmp_path)
     assert "No fit of the valves" in written.page.read_text(encoding="utf-8")
     page = written.page.read_text(encoding="utf-8")

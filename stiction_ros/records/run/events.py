@@ -24,17 +24,6 @@ FIGURES = ("p50", "p99", "p999", "max")
 
 
 @dataclasses.dataclass(frozen=True)
-class Estimate:
-    """One parameter of one fit."""
-
-    stamp: int  # end of the window, ns
-    name: str  # ``V1.f_s``
-    value: float  # estimate, % of travel for friction
-    low: float  # lower end of its interval, NaN when not given
-    high: float  # upper end of its interval, NaN when not given
-
-
-@dataclasses.dataclass(frozen=True)
 class ModeChange:
     """The controller's mode from a moment on."""
 
@@ -52,6 +41,14 @@ class Fit:
     stamp: int  # end of the window, ns
     identification: Mapping[str, Any]  # the mapping of ``identify --json`` without ``record``
     trusted: Mapping[str, float]  # friction trusted after this fit, by ``V1.f_s``, %
+
+    def friction(self, valve: str, key: str) -> tuple[float, float, float]:
+        """Return ``f_s`` or ``f_d`` of a valve and the ends of its interval, %; NaN for none."""
+        told = (one for one in self.identification.get("valves", ()) if one.get("name") == valve)
+        found: Mapping[str, Any] = next(told, {})
+        figures = (found.get(key), *(found.get(f"{key}_interval") or (None, None)))
+        value, low, high = (math.nan if one is None else float(one) for one in figures)
+        return value, low, high
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,21 +89,6 @@ def of_loop(messages: Iterable[BagMessage], space: str) -> list[BagMessage]:
 def node_of(status: Any) -> str:
     """Return the node that gave a diagnostic status: what stands before the colon."""
     return str(status.name).partition(":")[0].strip()
-
-
-def estimates(messages: Iterable[BagMessage]) -> tuple[Estimate, ...]:
-    """Return the estimates on ``stiction`` in their order."""
-    found = []
-    for message in on_topic(messages, JOINT_STATE, "stiction"):
-        state = message.message
-        stamp = stamp_ns(state)
-        for index, (name, value) in enumerate(zip(state.name, state.position, strict=False)):
-            low, high = (
-                float(ends[index]) if index < len(ends) else math.nan
-                for ends in (state.velocity, state.effort)
-            )
-            found.append(Estimate(stamp, str(name), float(value), low, high))
-    return tuple(found)
 
 
 def mode_changes(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:

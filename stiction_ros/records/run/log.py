@@ -19,7 +19,6 @@ class RunLog:
 
     record: Record  # the loop's signals, one segment; where some are missing stand bad samples
     start: int  # stamp of the record's first sample, ns
-    estimates: tuple[events.Estimate, ...]  # in the order they came
     modes: tuple[events.ModeChange, ...]  # changes of mode, model or friction, the first mode first
     loop_models: tuple[events.Text, ...]  # the YAML texts on ``loop_model``
     configs: tuple[events.Text, ...]  # what the nodes published on ``~/config``
@@ -98,7 +97,6 @@ def _log(bag: BagLoops, namespace: str | None) -> RunLog:
     return RunLog(
         record=record,
         start=start,
-        estimates=events.estimates(said),
         modes=events.mode_changes(said) or events.mode_texts(said),
         loop_models=events.texts(configured, "loop_model"),
         configs=configs,

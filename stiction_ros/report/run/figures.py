@@ -73,17 +73,18 @@ def whole_run(story: Story) -> str:
 def estimates(story: Story) -> str:
     """Return the estimates of f_S and f_D over time, what was trusted, and the truth."""
     record, log = story.record, story.log
-    if not log.estimates:
+    if not log.fits:
         return ""
     end, drawn = float(record.time[-1]), []
     for valve in record.valves:
         for column, (key, symbol) in enumerate((("f_s", "f_S"), ("f_d", "f_D"))):
             name = f"{valve}.{key}"
-            told = {e.stamp: (e.value, e.low, e.high) for e in log.estimates if e.name == name}
+            every = {f.stamp: f.friction(valve, key) for f in log.fits}
+            told = {stamp: found for stamp, found in every.items() if np.isfinite(found[0])}
             trusted = {f.stamp: (f.trusted.get(name, np.nan),) for f in log.fits}
             if not told:
                 continue
-            at = sorted({*told, *trusted})
+            at = sorted(trusted)
             time = np.array([0.0, *map(log.seconds, at), end])
             value, low, high = _held(at, told, 3)
             curves = [

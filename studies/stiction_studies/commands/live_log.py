@@ -1,7 +1,7 @@
 """The log of a loop that ran without ROS, as if it had been recorded."""
 
 from stiction_ros.online.session import LiveRun
-from stiction_ros.records.run.events import Estimate, Fit, ModeChange
+from stiction_ros.records.run.events import Fit, ModeChange
 from stiction_ros.records.run.log import RunLog
 
 
@@ -21,15 +21,6 @@ def log_of(live: LiveRun) -> RunLog:
         )
         for update in live.fits
     )
-    estimates = tuple(
-        Estimate(update.end * step, f"{valve.name}.{key}", value, *interval)
-        for update in live.fits
-        for valve in update.identification.valves
-        for key, value, interval in (
-            ("f_s", valve.static_friction, valve.static_interval),
-            ("f_d", valve.dynamic_friction, valve.dynamic_interval),
-        )
-    )
     modes = tuple(
         ModeChange(
             change.sample * step,
@@ -40,4 +31,4 @@ def log_of(live: LiveRun) -> RunLog:
         )
         for change in live.changes
     )
-    return RunLog(record, 0, estimates, modes, (), (), {}, {}, (), fits, live.stem_estimate)
+    return RunLog(record, 0, modes, (), (), {}, {}, (), fits, live.stem_estimate)

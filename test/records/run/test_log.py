@@ -1,8 +1,9 @@
+import json
 import math
 
-from bag_making import JOINT_STATE, SECOND, Bag, clock, joint_state
+from bag_making import SECOND, Bag, clock
 
-from stiction_ros.records.run.events import Estimate, Fit, ModeChange
+from stiction_ros.records.run.events import Fit, ModeChange
 from stiction_ros.records.run.log import RunLog, read_run
 from stiction_ros.report.run.scoring import PhaseStatus, phases
 
@@ -27,17 +28,18 @@ def test_a_run(bag: Bag) -> None:
     bag.diagnostics(start, "plant: step", {"published /pv": "30", "published:/diagnostics": "2"})
     bag.diagnostics(start, "estimator: fit", {"published:/diagnostics": "3"})
     stamp = start + 15 * SECOND
-    state = joint_state(stamp, ["V1.f_s", "V1.f_d"], [8.0, 1.0], [7.9, 0.9], [8.1])
-    bag.put("/stiction", JOINT_STATE, state, stamp)
+    valve = {"name": "V1", "f_s": 8.0, "f_s_interval": [7.9, 8.1], "f_d": None}
+    found = {"window_end": str(stamp), "identification": json.dumps({"valves": [valve]})}
+    bag.diagnostics(stamp, "estimator: fit", found)
     bag.text("/loop_model", "loop: tank", stamp)
     bag.writer.close()
 
     run = read_run(bag.writer.directory)
     assert len(run.record) == 30
     assert run.start == start
-    assert run.estimates[0] == Estimate(stamp, "V1.f_s", 8.0, 7.9, 8.1)
-    assert run.estimates[1].low == 0.9
-    assert math.isnan(run.estimates[1].high)
+    fit = run.fits[0]
+    assert (fit.stamp, fit.friction("V1", "f_s")) == (stamp, (8.0, 7.9, 8.1))
+    assert all(map(math.isnan, fit.friction("V1", "f_d")))
     assert run.modes == (
         ModeChange(start, "unaware", "ideal", ""),
         ModeChange(start + 20 * SECOND, "embedding", "fit 3", "trusted"),

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 from as_given import open_record
-from bag_making import JOINT_STATE as KIND
-from bag_making import SECOND, Bag, joint_state
+from bag_making import SECOND, Bag
 
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
@@ -18,8 +17,6 @@ def fill(bag: Bag, space: str, samples: int, mode: str) -> None:
     bag.text(f"{space}/mode", mode, 5 * SECOND)
     bag.text(f"{space}/plant/config", f"node: {space}/plant\nseed: {samples}", 5 * SECOND)
     bag.text(f"{space}/loop_model", f"loop: {mode}", 6 * SECOND)
-    state = joint_state(6 * SECOND, ["V1.f_s"], [float(samples)])
-    bag.put(f"{space}/stiction", KIND, state, 6 * SECOND)
     values = {"mode": mode, f"published:{space}/op": str(samples)}
     bag.diagnostics(5 * SECOND, f"{space}/controller: mode"[1:], values)
 
@@ -41,7 +38,6 @@ def test_a_run_has_only_what_its_loop_said(two: Path, space: str, samples: int, 
     assert [change.mode for change in run.modes] == [mode]
     assert [item.text for item in run.loop_models] == [f"loop: {mode}"]
     assert [item.topic for item in run.configs] == [f"/{space.strip('/')}/plant/config"]
-    assert [estimate.value for estimate in run.estimates] == [float(samples)]
     assert run.published == {"/a/op": 12, "/b/c/op": 15}
 
 

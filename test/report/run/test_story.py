@@ -26,7 +26,7 @@ def cut_run(samples: int, config: str) -> RunLog:
     )
     modes = (ModeChange(0, "unaware"), ModeChange(SWAP * 2 * 10**9, "embedding"))
     configs = (Text("/plant/config", 0, config),)
-    return RunLog(record, 0, (), modes, (), configs, {}, {})
+    return RunLog(record, 0, modes, (), configs, {}, {})
 
 
 ANNOUNCED = "{node: /plant, seed: 1, set_points: {repeat: 400.0, moves: []}}"
