@@ -36,13 +36,10 @@ EXAMINED = 20_000  # samples that are looked at
 FEWEST = 50  # samples from which anything is told of a swap
 
 
-def in_percent(
-    block: Block, given: OpUnit | None, *, named: bool = False
-) -> tuple[Block, str, str]:
+def in_percent(block: Block, given: OpUnit | None, *, named: bool) -> tuple[Block, str, str]:
     """Return the block with OP and stem in %, the unit, and a note on what was done.
 
-    A user or a tag list may have ``given`` the unit; whether a user ``named`` the columns matters
-    to the advice.
+    A user or a tag list may have ``given`` the unit, and a user may have ``named`` the columns.
 
     Raises:
         InputError: OP lies between 0 and 1 and nothing says what it is, or far outside of the unit
@@ -60,7 +57,7 @@ def in_percent(
     if unit is OpUnit.OTHER:
         return block, OWN, ""
     if unit is None:
-        return block, *_without_unit(block, ops, named=named)
+        return block, *_without_unit(ops)
     factor, offset = TO_PERCENT[unit]
     notes = [_fits(block, unit, given=given is not None, named=named)]
     if unit is not OpUnit.PERCENT:
@@ -73,7 +70,7 @@ def in_percent(
     return block, "%", "; ".join(filter(None, notes))
 
 
-def _without_unit(block: Block, ops: Sequence[Column], *, named: bool) -> tuple[str, str]:
+def _without_unit(ops: Sequence[Column]) -> tuple[str, str]:
     """Return the unit of an OP that bears none, by its values, and a note where it is unclear."""
     values = [op.values for op in ops if np.isfinite(op.values).any()]
     low = min((float(np.nanmin(v)) for v in values), default=0.0)
@@ -83,12 +80,6 @@ def _without_unit(block: Block, ops: Sequence[Column], *, named: bool) -> tuple[
             f"OP lies between {low:.3g} and {high:.3g}: a share of travel, or %",
             fix=f"say which with --op-unit share or --op-unit percent {OR_ROW}",
         )
-    usual, pv = PERCENT[0] <= low and high <= PERCENT[1], _only(block, "pv")
-    if not usual and not named and pv is not None and _like_percent(pv[1]):
-        return OWN, (
-            f"OP lies between {low:.4g} and {high:.4g} and bears no unit, {pv[0]} lies as an OP in "
-            "% would: look whether they are swapped"
-        )
     said = f"OP lies between {low:.3g} and {high:.3g}"
     if CURRENT[0] <= low < high <= CURRENT[1]:
         return "%", (f"{said} and bears no unit: taken as %; if it is a current say --op-unit ma")
@@ -97,7 +88,7 @@ def _without_unit(block: Block, ops: Sequence[Column], *, named: bool) -> tuple[
             f"{said}, perhaps without its mean: frictions are in its own unit; if it is a share "
             "say --op-unit share"
         )
-    return "%" if usual else OWN, ""
+    return "%" if PERCENT[0] <= low and high <= PERCENT[1] else OWN, ""
 
 
 def _fits(block: Block, unit: OpUnit, *, given: bool, named: bool) -> str:
@@ -113,11 +104,8 @@ def _fits(block: Block, unit: OpUnit, *, given: bool, named: bool) -> str:
         middle, above = float(np.median(percent)), float(np.mean(percent > PERCENT[1]))
         if not PERCENT[0] <= middle <= PERCENT[1] or above >= OFTEN:
             reason = f"{column.name} holds {shown}, median {np.median(values):.4g}, {said}"
-            op, pv = _only(block, "op"), _only(block, "pv")
-            if not named and op is not None and pv is not None and _like_percent(pv[1]):
-                least, most = np.nanmin(pv[1]), np.nanmax(pv[1])
-                reason = f"{reason}, and {pv[0]} holds {least:.4g} to {most:.4g}"
-                raise _swapped(block, reason, ("--op-unit", "other"))
+            if not named:
+                refuse_swapped(block, "--op-unit", "other")
             out = "leave --op-unit out or say another one" if given else "say another --op-unit"
             raise InputError(reason, fix=f"{out}; --op-unit other takes OP as it is")
         if float(np.mean(percent < PERCENT[0])) >= OFTEN:
@@ -126,11 +114,6 @@ def _fits(block: Block, unit: OpUnit, *, given: bool, named: bool) -> str:
                 "--op-unit other takes it as it is"
             )
     return note
-
-
-def _like_percent(values: FloatArray) -> bool:
-    there = values[np.isfinite(values)]
-    return bool(len(there)) and PERCENT[0] <= there.min() and bool(there.max() <= PERCENT[1])
 
 
 def refuse_twice(block: Block) -> None:
@@ -148,8 +131,8 @@ def refuse_twice(block: Block) -> None:
             )
 
 
-def refuse_swapped(block: Block) -> None:
-    """Raise an :class:`InputError` when PV and OP look swapped.
+def refuse_swapped(block: Block, *otherwise: str) -> None:
+    """Raise an :class:`InputError` when PV and OP look swapped; options are for those that are not.
 
     Where a set-point is recorded, the measurement is what stays near it. Else:
     In closed loop a controller's output moves by K (Δe + T_s/T_i e): its Δ is explained by the
@@ -162,12 +145,14 @@ def refuse_swapped(block: Block) -> None:
         return
     if block.of("sp"):
         if sp is not None and _stays_near(sp[1], op[1], pv[1]):
-            raise _swapped(block, f"{op[0]} stays near the set-point {sp[0]}, {pv[0]} does not")
+            said = f"{op[0]} stays near the set-point {sp[0]}, {pv[0]} does not"
+            raise _swapped(block, said, otherwise)
         return
     for stride in STRIDES:
         right, wrong = _explained(op[1], pv[1], stride), _explained(pv[1], op[1], stride)
         if wrong > FOLLOWS and 1.0 - right > LEADS * (1.0 - wrong):
-            raise _swapped(block, f"{pv[0]} moves as a controller's output would, by {op[0]}")
+            said = f"{pv[0]} moves as a controller's output would, by {op[0]}"
+            raise _swapped(block, said, otherwise)
 
 
 def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
@@ -178,7 +163,7 @@ def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
     return nearness(sp[there], one[there], other[there]) is not None
 
 
-def _swapped(block: Block, reason: str, otherwise: Sequence[str] = ()) -> InputError:
+def _swapped(block: Block, reason: str, otherwise: Sequence[str]) -> InputError:
     """Return the error of a block whose one OP and one PV look swapped."""
     tag, name = {}, {}
     for key, column in block.columns.items():
