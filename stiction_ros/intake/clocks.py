@@ -258,14 +258,9 @@ def _after(block: Block, told: Sequence[_Rows | None], change: Change) -> FlagAr
             late = _Rows.of(block).rank >= rows.rank[seams[0]]
             return np.asarray((wall > high) | (wall >= low) & late)
     inside = (wall >= low) & (wall < high)
-    if not inside.any():
-        return wall >= high
-    # One pass is there. Were it the other one, there would be a hole longer than all others.
-    steps, late = np.diff(wall), bool((wall >= high).any())
-    hole = np.min(steps[inside[1:] | inside[:-1]], initial=np.inf) + high - low
-    if late == (wall < low).any() or hole <= np.max(steps, initial=high - low):
+    if inside.any():
         raise _untold(block, change)
-    return wall >= (low if late else high)
+    return wall >= high
 
 
 def _untold(block: Block, change: Change) -> InputError:
