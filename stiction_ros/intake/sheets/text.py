@@ -30,8 +30,6 @@ REFUSED = (
 """First bytes of files that are no text, what these are, and what helps."""
 
 HEAD = 4096  # bytes by which the encoding is told
-SHORTEST = 16  # bytes from which UTF-16 without its mark is told
-NULLS = 0.7  # share of zero bytes on one side of the pairs in UTF-16 without its mark
 
 
 def _as_western(error: UnicodeError) -> tuple[str, int]:
@@ -89,11 +87,4 @@ def _encoding(head: bytes) -> str:
         return "utf-16"
     if b"\0" not in head:
         return "utf-8-sig"
-    pairs = len(head) // 2
-    if len(head) >= SHORTEST:
-        even, odd = head[0::2].count(0) / pairs, head[1::2].count(0) / pairs
-        if odd > NULLS and even < 0.1 * odd:
-            return "utf-16-le"
-        if even > NULLS and odd < 0.1 * even:
-            return "utf-16-be"
     raise InputError("is no text", fix="save it as CSV in UTF-8")
