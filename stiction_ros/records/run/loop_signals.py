@@ -118,19 +118,12 @@ class LoopSignals:
                 where=self.where,
                 fix=f"its loops are {', '.join(loops)}",
             )
-        signals = {signal for _, signal in self._usable}
-        lacks = [
-            topic
-            for topic, there in (
-                ("pv", "pv" in signals),
-                ("op (or op_applied)", bool({"op", "op_applied"} & signals)),
-            )
-            if not there
-        ]
-        what = f"no topic {' and no topic '.join(lacks)} of {JOINT_STATE}"
-        if not lacks:
-            what = f"pv and op of {JOINT_STATE}, but never in one namespace"
-        return InputError(f"holds {what}", where=self.where, fix="record pv and op of a loop")
+        there = ", ".join(f"{space}/{signal}" for space, signal in self._usable)
+        return InputError(
+            f"holds no pv with op (or op_applied) of {JOINT_STATE} in one namespace",
+            where=self.where,
+            fix=f"record pv and op of a loop{f', not only {there}' if there else ''}",
+        )
 
 
 def _wrong(names: list[str], values: list[float]) -> str:
