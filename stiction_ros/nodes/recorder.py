@@ -17,7 +17,7 @@ from stiction_ros.nodes.shared.messages import SECOND, message_class, offered_qo
 from stiction_ros.nodes.shared.peers import Inlet
 from stiction_ros.online.plain_settings import RecorderNodeSettings
 from stiction_ros.records.bag.message_definitions import definition
-from stiction_ros.records.bag.writer import BagWriter, Splitting
+from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.run.loop_signals import JOINT_STATE
 from stiction_ros.records.storage.log_time import SIMULATED, LogTime
 
@@ -72,9 +72,9 @@ class RecorderNode(ManagedNode):
         names = [self.resolve_topic_name(name) for name in settings.topics]
         space = self.get_namespace()
         self._wanted = topic_choice(names, settings.regex, settings.exclude_regex, space)
-        splitting = Splitting(settings.max_bag_size, round(settings.max_bag_duration * SECOND))
         directory = free_directory(Path(settings.directory), self._bags)
-        self.writer = BagWriter(directory, settings.compression, splitting)
+        most = settings.max_bag_size, round(settings.max_bag_duration * SECOND)
+        self.writer = BagWriter(directory, settings.compression, *most)
         self._bags.append(directory)
         if len(self._bags) > 1:
             self.log.info(f"recording into {directory}")

@@ -132,8 +132,8 @@ def test_a_killed_recorder_loses_nothing_that_it_has_counted(
 
 FINISHING = """
 import sys
-from stiction_ros.records.bag.writer import BagWriter, Splitting
-writer = BagWriter(sys.argv[1], splitting=Splitting(size=400_000))
+from stiction_ros.records.bag.writer import BagWriter
+writer = BagWriter(sys.argv[1], most_bytes=400_000)
 writer.add_topic("/mode", "std_msgs/msg/String", "string data\\n", "")
 for k in range(20000):
     writer.write("/mode", k.to_bytes(8, "little") * 10, k, k)

@@ -3,7 +3,6 @@
 While it runs, ``<dir>_0.mcap`` is a journal; :func:`finish_bag` makes a finished bag of it.
 """
 
-import dataclasses
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -19,7 +18,7 @@ from stiction_ros.records.bag.run_metadata import RUN, news
 from stiction_ros.records.storage.bag_metadata import BagTopic, Qos, qos_yaml
 from stiction_ros.records.storage.mcap_scan import MAGIC, McapScan
 
-__all__ = ["BagWriter", "Qos", "Splitting"]
+__all__ = ["BagWriter", "Qos"]
 _BLOCK = 1 << 20
 
 
@@ -96,21 +95,14 @@ class Journal:
         self.size += written
 
 
-@dataclasses.dataclass(frozen=True)
-class Splitting:
-    """When a bag goes on in its next file; 0 for never."""
-
-    size: int = 0  # bytes of messages in one file, before compression
-    duration: int = 0  # log time in one file, ns
-
-
 class BagWriter:
     """A rosbag2 bag (MCAP storage) being written; also a context manager.
 
     Every message is one unchunked record, handed to the operating system before :meth:`write`
     returns. One thread writes. Times are integers in ns. What ``~/config`` and
     ``loop_model`` say is kept as metadata of the run too. The directory is made with parents and
-    must not hold anything yet.
+    must not hold anything yet. The bag goes on in its next file where one holds ``most_bytes`` of
+    messages, before compression, or ``most_ns`` of log time; 0 for never.
 
     Attributes:
         counts: messages written so far, by topic.
@@ -120,21 +112,20 @@ class BagWriter:
         self,
         directory: str | Path,
         compression: str = "zstd",
-        splitting: Splitting = Splitting(),
+        most_bytes: int = 0,
+        most_ns: int = 0,
         chunk_size: int = 1 << 18,
     ) -> None:
         self.directory = Path(directory)
         one_of(compression, ("zstd", "lz4", "none"), "compression")
         self._packing = compression, chunk_size
-        self._splitting = splitting
-        self._limited = splitting.size > 0 or splitting.duration > 0
+        self._most = most_bytes, most_ns
         self._topics: dict[str, BagTopic] = {}
         self._channels: dict[str, int] = {}
         self.counts: dict[str, int] = {}
         self._schemas: dict[tuple[str, str], int] = {}
         self._run = {"recorder": f"stiction_ros {__version__}"}
         self._number = 0
-        self._gone: set[int] = set()
         self._first: int | None = None
         self._closed = False
         _make_empty(self.directory)
@@ -175,7 +166,7 @@ class BagWriter:
         """
         if topic not in self._topics:
             raise InputError(f"topic {topic} was not added", where=str(self.directory))
-        if self._limited and self._is_full(log_time):
+        if self._is_full(log_time):
             self._go_on()
         sequence = self.counts[topic] & 0xFFFFFFFF
         channel = self._channels[topic]
@@ -197,14 +188,10 @@ class BagWriter:
             return ""
         self.directory.mkdir(parents=True, exist_ok=True)
         self._journal.put_back()
-        gone = [
-            number
-            for number in range(self._number)
-            if number not in self._gone and not storage_path(self.directory, number).exists()
-        ]
-        self._gone.update(gone)
+        before = (storage_path(self.directory, number) for number in range(self._number))
+        gone = sum(not path.exists() for path in before)
         said = f"{self._journal.path} was removed and is written again"
-        return f"{said}; {len(gone)} files before it are lost" if gone else said
+        return f"{said}; {gone} files before it are lost" if gone else said
 
     def close(self) -> None:
         """Finish the bag; a second call does nothing. If the storage refuses the journals stay."""
@@ -227,12 +214,12 @@ class BagWriter:
 
     def _is_full(self, log_time: int) -> bool:
         """Tell whether a message of ``log_time`` belongs into the next file."""
-        limits = self._splitting
+        size, duration = self._most
         if self._first is None or log_time < self._first:  # simulated time follows wall time
             self._first = log_time
-        elif limits.duration and log_time - self._first >= limits.duration:
+        elif duration and log_time - self._first >= duration:
             return True
-        return bool(limits.size) and self._journal.size >= limits.size
+        return bool(size) and self._journal.size >= size
 
     def _go_on(self) -> None:
         """Begin the next file; where the storage refuses the present one stays in use."""

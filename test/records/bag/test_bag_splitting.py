@@ -13,23 +13,23 @@ from rosbags.rosbag2 import Reader
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.bag.repair import RepairStatus, repair_bag
-from stiction_ros.records.bag.writer import BagWriter, Splitting
+from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.storage.log_time import SIMULATED
 
 CONFIG = "node: /plant\nversion: '0.1'\nseed: 7\n"
 
 
-def split_bag(directory: Path, splitting: Splitting) -> Bag:
-    bag = Bag(BagWriter(directory, splitting=splitting))
+def split_bag(directory: Path, **most: int) -> Bag:
+    bag = Bag(BagWriter(directory, **most))
     bag.text("/plant/config", CONFIG, 5 * SECOND)
     bag.loop(100)
     bag.text("/loop_model", "loop: tank", 110 * SECOND)
     return bag
 
 
-@pytest.fixture(params=[Splitting(size=8000), Splitting(duration=10 * SECOND)], ids=["size", "s"])
+@pytest.fixture(params=[{"most_bytes": 8000}, {"most_ns": 10 * SECOND}], ids=["size", "s"])
 def split(request, tmp_path: Path) -> Bag:
-    return split_bag(tmp_path / "run", request.param)
+    return split_bag(tmp_path / "run", **request.param)
 
 
 def raw(path: Path) -> list[tuple[str, int, bytes]]:
@@ -49,7 +49,7 @@ def test_all_files_are_read_in_their_order(split: Bag) -> None:
 
 
 def test_ten_files_and_more_stay_in_their_order(tmp_path: Path) -> None:
-    bag = split_bag(tmp_path / "run", Splitting(duration=SECOND))
+    bag = split_bag(tmp_path / "run", most_ns=SECOND)
     bag.writer.close()
     assert "run_100.mcap" in names(tmp_path / "run")
     assert raw(tmp_path / "run") == bag.written
@@ -64,14 +64,14 @@ def test_rosbags_reads_every_message_of_every_file(split: Bag) -> None:
 
 
 def test_a_file_holds_no_more_than_its_duration(tmp_path: Path) -> None:
-    split_bag(tmp_path / "run", Splitting(duration=10 * SECOND)).writer.close()
+    split_bag(tmp_path / "run", most_ns=10 * SECOND).writer.close()
     for path in (tmp_path / "run").glob("*.mcap"):
         times = [message.log_time for message in read_raw(path)]
         assert max(times) - min(times) < 10 * SECOND
 
 
 def test_a_file_holds_little_more_than_its_size(tmp_path: Path) -> None:
-    bag = split_bag(tmp_path / "run", Splitting(size=20000))
+    bag = split_bag(tmp_path / "run", most_bytes=20000)
     for path in sorted((tmp_path / "run").glob("*.mcap"))[:-1]:
         assert 20000 <= path.stat().st_size < 20000 + 200
     bag.writer.close()
@@ -121,7 +121,7 @@ def test_a_killed_writer_of_many_files_is_repaired(split: Bag, tmp_path: Path) -
 
 def test_messages_before_the_clock_get_its_time_across_files(tmp_path: Path) -> None:
     wall = 1_790_000_000 * SECOND
-    bag = Bag(BagWriter(tmp_path / "run", splitting=Splitting(size=2500)))
+    bag = Bag(BagWriter(tmp_path / "run", most_bytes=2500))
     for number in range(40):
         bag.text("/mode", "unaware", wall + number)
     bag.writer.add_metadata(SIMULATED, {"first": str(5 * SECOND)})
@@ -165,7 +165,7 @@ def test_what_metadata_says_is_compared_with_the_files(split: Bag) -> None:
 
 
 def test_the_time_of_a_file_counts_from_simulated_time(tmp_path: Path) -> None:
-    bag = Bag(BagWriter(tmp_path / "run", splitting=Splitting(duration=100 * SECOND)))
+    bag = Bag(BagWriter(tmp_path / "run", most_ns=100 * SECOND))
     bag.text("/plant/config", CONFIG, 1_790_000_000 * SECOND)
     bag.loop(50)
     bag.writer.close()
@@ -176,7 +176,7 @@ def test_the_time_of_a_file_counts_from_simulated_time(tmp_path: Path) -> None:
 def test_a_next_file_that_finds_no_room_leaves_the_present_one_in_use(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bag = split_bag(tmp_path / "run", Splitting(size=8000))
+    bag = split_bag(tmp_path / "run", most_bytes=8000)
     files = names(tmp_path / "run")
     monkeypatch.setattr("stiction_ros.records.bag.writer.Journal.put", refused)
     refusals = 0
@@ -202,7 +202,7 @@ def refused(*_args: object) -> None:
 
 def test_only_what_came_before_simulated_time_gets_the_first_one(tmp_path: Path) -> None:
     """Also when a later file begins with other messages than the first on ``/clock``."""
-    bag = Bag(BagWriter(tmp_path / "run", splitting=Splitting(duration=3 * SECOND)))
+    bag = Bag(BagWriter(tmp_path / "run", most_ns=3 * SECOND))
     wall = 1_700_000_000 * SECOND
     for _ in range(3):
         bag.text("/plant/config", CONFIG, wall)
@@ -233,7 +233,7 @@ def test_a_recorder_may_tell_the_first_simulated_time(tmp_path: Path) -> None:
 
 
 def test_what_was_removed_is_written_again(tmp_path: Path) -> None:
-    bag = split_bag(tmp_path / "run", Splitting(size=8000))
+    bag = split_bag(tmp_path / "run", most_bytes=8000)
     assert bag.writer.put_back() == ""
     count = len(names(tmp_path / "run"))
     kept = len(raw(tmp_path / "run" / f"run_{count - 1}.mcap"))

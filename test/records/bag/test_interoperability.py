@@ -9,7 +9,7 @@ from foreign_readers import by_us, check, checker, differences
 from mcap.writer import CompressionType, Writer
 
 from stiction_ros.records.bag.repair import repair_bag
-from stiction_ros.records.bag.writer import BagWriter, Splitting
+from stiction_ros.records.bag.writer import BagWriter
 
 
 def fill(bag: Bag) -> None:
@@ -22,10 +22,10 @@ def fill(bag: Bag) -> None:
 
 
 CASES = {
-    "zstd": ("zstd", Splitting(), 1 << 18),
-    "lz4": ("lz4", Splitting(), 1 << 18),
-    "none": ("none", Splitting(), 4096),
-    "split": ("zstd", Splitting(size=20000), 4096),
+    "zstd": ("zstd", 0, 0, 1 << 18),
+    "lz4": ("lz4", 0, 0, 1 << 18),
+    "none": ("none", 0, 0, 4096),
+    "split": ("zstd", 20000, 0, 4096),
 }
 
 
