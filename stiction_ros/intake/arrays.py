@@ -32,16 +32,10 @@ _WORDS: Mapping[str, type[enum.StrEnum]] = {
     "dates": DateOrder,
 }
 
-_AS_ARGUMENTS = (
-    (re.compile(r",? or (?:the tag|tags) with --tags F| \(or a row for this file in --tags\)"), ""),
-    (re.compile(r"--(?=(?:sp|stem) names)"), ""),
-    (re.compile(r"--auto\b"), "automatic"),
-    (re.compile(r"--(op|pv|sp|stem) (\w+)=(\w+)"), r"\1={'\2': '\3'}"),
-    (re.compile(r"--([a-z]+)-([a-z]+) ([\w-]+)"), r"\1_\2='\3'"),
-    (re.compile(r"--([a-z]+) (\w+)"), r"\1='\2'"),
-    (re.compile(r"--([a-z]+)-([a-z]+)"), r"\1_\2"),
+_TAG_LISTS = re.compile(
+    r",? or (?:the tag|tags) with --tags F| \(or a row for this file in --tags\)"
 )
-"""Options of the command to the arguments that are named after them."""
+"""What an error advises of tag lists, which only files have."""
 
 
 def record_from_arrays(
@@ -148,9 +142,9 @@ def _record(
 
 
 def _as_arguments(text: str) -> str:
-    for option, argument in _AS_ARGUMENTS:
-        text = option.sub(argument, text)
-    return text
+    """Return advice of the command with arguments in place of options: ``op_unit share``."""
+    said = re.sub(r"--auto\b", "automatic", _TAG_LISTS.sub("", text))
+    return re.sub(r"--([a-z-]+)", lambda option: option[1].replace("-", "_"), said)
 
 
 def _cells(values: Any, key: str) -> Cells:
