@@ -72,7 +72,6 @@ class _Loop:
         self._pv = {g.number: g.values for g in pv}
         self._of = {signal: self._by_run(given[signal]) for signal in widths if signal != "pv"}
         self._set_points(given["sp"])
-        self._sp_lacks = bool(not given["sp"] and signals.tags(space, "sp"))
         self._has_stem = bool(signals.tags(space, "stem"))
 
     def run(self, number: int, notes: Sequence[str]) -> LoopRun:
@@ -146,8 +145,6 @@ class _Loop:
         """Return the last set-points given at or before each stamp."""
         known = self._of["sp"][number]
         if not known or not len(stamps):
-            if self._sp_lacks:
-                notes.append("sp has no value for every pv, left out")
             return None
         late = int(np.count_nonzero(stamps < min(known)))
         if late:
