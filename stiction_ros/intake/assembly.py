@@ -49,7 +49,7 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     timed = put_right(repairs.each(found.blocks, rules, repairs.with_times), rules)
     timed = repairs.each(timed, rules, partial(repairs.with_values, shared=found.shared))
     if len(timed) > 1:
-        timed = repairs.each(timed, rules, repairs.sorted_rows)
+        timed = repairs.each(timed, rules, lambda b, r: repairs.in_order(b, r, alone=False)[0])
     block, differing = joined(repairs.each(timed, rules, repairs.checked))
     for name, count in differing.items():
         said = f"{name}: {plural(count, 'value')} at a stamp that another table has differ"

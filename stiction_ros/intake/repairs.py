@@ -125,8 +125,8 @@ def _listed(column: Column, missing: FlagArray) -> str:
     return f" ({', '.join(told)})" if told else ""
 
 
-def in_order(block: Block, rules: Rules) -> list[Block]:
-    """Return the rows with increasing stamps; several blocks when the clock began anew."""
+def in_order(block: Block, rules: Rules, *, alone: bool = True) -> list[Block]:
+    """Return the rows with increasing stamps; several blocks when the clock of one began anew."""
     time = block.time
     steps = np.diff(time)
     if (steps > 0).all():
@@ -134,7 +134,7 @@ def in_order(block: Block, rules: Rules) -> list[Block]:
     if rules.strict:
         sample_time(block.clock.start + time, str(block.path), block.place)  # tells which row
     back = np.flatnonzero(steps < 0)
-    if len(back) and len(back) <= 0.001 * len(time) + 3:
+    if alone and len(back) and len(back) <= 0.001 * len(time) + 3:
         runs = np.split(np.arange(len(time)), back + 1)
         longest = [run for run in runs if len(run) >= max(10, 0.02 * len(time))]
         begins = sorted((float(time[run[0]]), float(time[run[-1]])) for run in longest)
@@ -146,16 +146,6 @@ def in_order(block: Block, rules: Rules) -> list[Block]:
     if len(back):
         rules.told.append(f"{plural(len(back), 'row')} out of order sorted")
     return [_without_repeats(block.rows(order), rules)]
-
-
-def sorted_rows(block: Block, rules: Rules) -> Block:
-    """Return the rows of one of several tables by :func:`in_order`, as one block."""
-    told = len(rules.told)
-    (first, *others) = in_order(block, rules)
-    if not others:
-        return first
-    del rules.told[told:]
-    return _without_repeats(block.rows(np.argsort(block.time, kind="stable")), rules)
 
 
 def _without_repeats(block: Block, rules: Rules) -> Block:
