@@ -47,15 +47,15 @@ def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:
     Raises:
         InputError: the tag list cannot be read, or names a file that may be one of several.
     """
-    tags = None if options.tags is None else read_tag_list(options.tags)
+    tags = read_tag_list(options.tags)
     files: Iterable[Path] = _files(paths, options)
-    if tags is not None and tags.rows:
+    if tags.rows:
         files = list(files)
         tags.refuse_ambiguous(files)
     yield from _with_names_of_their_own(_loops(files, options, tags))
 
 
-def _loops(files: Iterable[Path], options: IntakeOptions, tags: TagList | None) -> Iterator[Loop]:
+def _loops(files: Iterable[Path], options: IntakeOptions, tags: TagList) -> Iterator[Loop]:
     tables: list[_Table] = []
     for file in files:
         told = Path(str(file).encode(errors="backslashreplace").decode())
@@ -69,7 +69,7 @@ def _loops(files: Iterable[Path], options: IntakeOptions, tags: TagList | None) 
         try:
             if os.path.exists(file) and not (os.path.isfile(file) or os.path.isdir(file)):
                 raise InputError("is a pipe or a device", where=str(file), fix="save it as a file")
-            way = FileWay(options) if tags is None else tags.way_of(file, options)
+            way = tags.way_of(file, options)
             with foreign(file):
                 sheets = open_sheets(file)
         except InputError as error:
@@ -95,8 +95,7 @@ def _loops(files: Iterable[Path], options: IntakeOptions, tags: TagList | None) 
 
 def strange_files(paths: Sequence[Path], options: IntakeOptions) -> list[str]:
     """Return the files that the tag list names and that are none of those below ``paths``."""
-    tags = None if options.tags is None else read_tag_list(options.tags)
-    return [] if tags is None else tags.strange(list(_files(paths, options)))
+    return read_tag_list(options.tags).strange(list(_files(paths, options)))
 
 
 def one_loop(path: Path, options: IntakeOptions, name: str | None = None) -> Loop:
@@ -151,6 +150,9 @@ class _Table:
     sheet: Sheet
     plan: Plan
     way: FileWay
+
+
+_Signals = tuple[_Table, Block]  # signals of a loop, and the table that they stand in
 
 
 def _files(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Path]:
@@ -231,7 +233,7 @@ def _groups(tables: Sequence[_Table]) -> list[list[_Table]]:
 
 def _read(group: Sequence[_Table]) -> Iterator[Loop]:
     """Yield the loops of tables that belong together."""
-    blocks: dict[str, list[Block]] = {}
+    found: dict[str, list[_Signals]] = {}
     for table in group:
         path = table.sheet.path
         try:
@@ -248,40 +250,35 @@ def _read(group: Sequence[_Table]) -> Iterator[Loop]:
             for name in table.plan.loops or [table.sheet.name]:
                 yield Loop(name, (path,), (), problem=str(error))
             continue
-        for name, found in read.items():
-            blocks.setdefault(name, []).extend(found)
-    for name in list(blocks):
-        yield _loop(name, tuple(blocks.pop(name)), group)
+        for name, blocks in read.items():
+            found.setdefault(name, []).extend((table, block) for block in blocks)
+    for name in list(found):
+        yield _loop(name, found.pop(name))
 
 
-def _loop(name: str, blocks: tuple[Block, ...], group: Sequence[_Table]) -> Loop:
+def _loop(name: str, read: Sequence[_Signals]) -> Loop:
     """Return a loop of tables, with its problem where it cannot be made into records."""
-    single = group[0].plan.single
-    files = {block.path for block in blocks}
-    own = [table for table in group if table.sheet.path in files]
-    named = all(table.plan.named for table in own)
+    tables, blocks = zip(*read, strict=True)
+    single, named = tables[0].plan.single, all(table.plan.named for table in tables)
     found = Found(name, blocks[0].path.name if single else name, blocks, named, not single)
     try:
         with foreign(found.files[0]):
-            ways = {table.sheet.path: table.way for table in own}
-            return loop_of(found, _options_of(found, ways))
+            return loop_of(found, _options_of(name, read))
     except InputError as error:
         return unread(found, str(error))
 
 
-def _options_of(found: Found, ways: Mapping[Path, FileWay]) -> IntakeOptions:
+def _options_of(name: str, read: Sequence[_Signals]) -> IntakeOptions:
     """Return the options of a loop, of which several files may hold signals."""
-    of_op = {block.path for block in found.blocks if any(k.signal == "op" for k in block.columns)}
-    single = not found.shared
-    units = {ways[path].op_unit(found.name, single=single) for path in of_op}
-    steps = {ways[path].options.sample_time for path in found.files}
+    units = {t.way.op_unit(name, single=t.plan.single) for t, block in read if block.of("op")}
+    steps = {table.way.options.sample_time for table, _ in read}
     for what, said in (("unit of OP", units), ("sample time", steps)):
         if len(said) > 1:
             raise InputError(
-                f"the {what} of {found.name} is not the same in all its files",
+                f"the {what} of {name} is not the same in all its files",
                 fix="say it in a row of --tags for each of them",
             )
-    first = ways[found.files[0]].options
+    first = read[0][0].way.options
     return dataclasses.replace(
         first, op_unit=next(iter(units), first.op_unit), sample_time=next(iter(steps))
     )

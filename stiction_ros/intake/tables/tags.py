@@ -194,12 +194,15 @@ class TagList:
         return [file for file in dict.fromkeys(row.file for row in self.rows) if file not in there]
 
 
-def read_tag_list(path: Path) -> TagList:
+def read_tag_list(path: Path | None) -> TagList:
     """Read a table with a row a loop (``loop,pv,sp,op,mode``) or a tag (``tag,loop,signal``).
 
     A column ``op_unit`` may say ``percent``, ``share`` or ``ma``. A row with a ``file`` counts
-    for that file alone, and may have ``time``, ``dates``, ``time_unit`` and ``sample_time``.
+    for that file alone, and may have ``time``, ``dates``, ``time_unit`` and ``sample_time``. No
+    ``path`` is a list without rows.
     """
+    if path is None:
+        return TagList({}, {}, [])
     fix = "a tag list has the columns loop,pv,sp,op,mode with a row a loop, or tag,loop,signal"
     with foreign(path):
         rows = [_row(cells, where) for where, cells in list_rows(path, _is_tag_list, fix)]
