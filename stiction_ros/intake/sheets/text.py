@@ -43,14 +43,12 @@ codecs.register_error("stiction_western", _as_western)
 
 
 def magic(path: Path) -> bytes:
-    """Return the first bytes of a file; one that cannot be read is an :class:`InputError`."""
+    """Return the first bytes of a file; none of that name is an :class:`InputError`."""
     try:
         with path.open("rb") as file:
             return file.read(4)
     except FileNotFoundError:
         raise InputError("no such file", fix="check the path") from None
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})") from None
 
 
 @contextlib.contextmanager
@@ -74,8 +72,6 @@ def open_text(path: Path) -> Iterator[io.TextIOBase]:
             )
     except (EOFError, zlib.error, gzip.BadGzipFile):
         raise InputError("is cut off or damaged", fix="pack or copy it anew") from None
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror or error})") from None
 
 
 def _opened(path: Path, first: bytes) -> contextlib.AbstractContextManager[Any]:

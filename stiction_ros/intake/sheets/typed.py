@@ -65,14 +65,6 @@ def _parquet(path: Path) -> Sheet:
     except ImportError:
         raise InputError("needs pyarrow", fix=INSTALL) from None
 
-    @contextlib.contextmanager
-    def opened() -> Iterator[Any]:
-        try:
-            with parquet.ParquetFile(path) as file:
-                yield file
-        except (arrow.ArrowException, OSError) as error:
-            raise InputError(f"cannot be read ({str(error).splitlines()[0][:80]})") from None
-
     def cells(column: Any) -> Cells:
         kind, types = column.type, arrow.types
         if types.is_timestamp(kind) or types.is_date(kind):
@@ -85,13 +77,11 @@ def _parquet(path: Path) -> Sheet:
         return ["" if value is None else str(value) for value in column.to_pylist()]
 
     def batches(size: int) -> Iterator[Sequence[Cells]]:
-        with opened() as file:
+        with parquet.ParquetFile(path) as file:
             for batch in file.iter_batches(batch_size=size):
                 yield list(map(cells, batch.columns))
 
-    with opened() as file:
-        names = list(map(str, file.schema_arrow.names))
-    return ColumnSheet(path, names, batches, 1)
+    return ColumnSheet(path, list(map(str, parquet.read_schema(path).names)), batches, 1)
 
 
 def _holds_workbook(path: Path) -> bool:
