@@ -6,8 +6,6 @@ from typing import Any
 
 import yaml
 
-from stiction_ros.errors import InputError
-
 VERSION = 9  # version of ``metadata.yaml``: QoS is a list of mappings with enums as words
 INFINITE_NS = 2**63 - 1  # nanoseconds by which ROS writes an infinite duration
 
@@ -15,14 +13,13 @@ QOS_WORDS = {
     "history": ("system_default", "keep_last", "keep_all", "unknown"),
     "reliability": ("system_default", "reliable", "best_effort", "unknown", "best_available"),
     "durability": ("system_default", "transient_local", "volatile", "unknown", "best_available"),
-    "liveliness": ("system_default", "automatic", "manual_by_topic", "unknown", "best_available"),
 }
-"""Words of ROS; those of the first three in the order of the numbers that rmw gives them."""
+"""Words of ROS in the order of the numbers that rmw gives them."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Qos:
-    """Quality of service that a publisher offers; a word that ROS does not know is refused."""
+    """Quality of service that a publisher offers, in words of ROS."""
 
     history: str = "keep_last"  # ``keep_last``, ``keep_all``, ``system_default`` or ``unknown``
     depth: int = 10  # messages kept when history is ``keep_last``
@@ -33,14 +30,6 @@ class Qos:
     liveliness: str = "automatic"  # ``automatic``, ``manual_by_topic``, …
     liveliness_lease_duration: int = INFINITE_NS  # ns
     avoid_ros_namespace_conventions: bool = False  # as in ROS
-
-    def __post_init__(self) -> None:
-        for key, words in QOS_WORDS.items():
-            word = getattr(self, key)
-            if word not in words:
-                raise InputError(
-                    f"{word!r} is no QoS {key}", where="qos", fix=f"use one of {', '.join(words)}"
-                )
 
     def mapping(self) -> dict[str, Any]:
         """Return the profile as rosbag2 writes it, keys in its order."""

@@ -98,8 +98,6 @@ def storage_files(path: str | Path) -> tuple[Path, ...]:
     for file in listing.files:
         if not file.is_file():
             raise InputError(f"{file.name} is missing", where=str(path), fix="put it back")
-    if not listing.files:
-        raise InputError("lists no file", where=str(listing.where))
     return listing.files
 
 
