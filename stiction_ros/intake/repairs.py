@@ -1,7 +1,7 @@
 """What is wrong with the rows of a loop: told, counted, left out or taken as missing."""
 
 import dataclasses
-import itertools
+import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 
@@ -12,7 +12,7 @@ from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.intake.words import WORDS
 from stiction_ros.records.record import Quality
-from stiction_ros.records.regular import HELD, sample_time, spread_evenly
+from stiction_ros.records.regular import HELD, begun_anew, sample_time, spread_evenly
 from stiction_ros.signals.holds import stretches
 from stiction_ros.texts import plural
 
@@ -135,13 +135,10 @@ def in_order(block: Block, rules: Rules, *, alone: bool = True) -> list[Block]:
         sample_time(block.clock.start + time, str(block.path), block.place)  # tells which row
     back = np.flatnonzero(steps < 0)
     if alone and len(back) and len(back) <= 0.001 * len(time) + 3:
-        runs = np.split(np.arange(len(time)), back + 1)
-        longest = [run for run in runs if len(run) >= max(10, 0.02 * len(time))]
-        begins = sorted((float(time[run[0]]), float(time[run[-1]])) for run in longest)
-        overlap = any(b[0] <= a[1] for a, b in itertools.pairwise(begins))
-        if len(longest) > 1 and overlap and not block.clock.dated:
-            rules.told.append(f"time begins anew: {len(longest)} runs")
-            return [one for run in longest for one in in_order(block.rows(run), rules)]
+        runs = begun_anew(time, max(10, math.ceil(0.02 * len(time))))
+        if len(runs) > 1 and not block.clock.dated:
+            rules.told.append(f"time begins anew: {len(runs)} runs")
+            return [one for run in runs for one in in_order(block.rows(run), rules)]
     order = np.argsort(time, kind="stable")
     if len(back):
         rules.told.append(f"{plural(len(back), 'row')} out of order sorted")

@@ -54,6 +54,18 @@ def split_at_gaps(time: FloatArray) -> list[tuple[int, int]]:
     return list(itertools.pairwise(edges))
 
 
+def begun_anew(time: FloatArray | IntArray, least: int) -> list[IntArray]:
+    """Return the rows of each run where a clock began anew, and all in one where it did not.
+
+    A run of rising times has ``least`` rows, of which as many lie within the times of the next one.
+    """
+    runs = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) < 0) + 1)
+    long = [run for run in runs if len(run) >= least]
+    pairs = itertools.pairwise(sorted((time[run] for run in long), key=lambda run: float(run[0])))
+    again = (np.count_nonzero((one >= other[0]) & (one <= other[-1])) for one, other in pairs)
+    return long if any(count >= least for count in again) else [np.arange(len(time))]
+
+
 def regular_part(time: FloatArray, first: int, last: int) -> Part:
     """Return rows ``first`` up to ``last`` of increasing times, (rows,), s, on a regular grid.
 

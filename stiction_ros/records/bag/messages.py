@@ -1,6 +1,5 @@
 """Reads the messages of bags: rosbag2 directories, bare files, unfinished files."""
 
-import bisect
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -8,10 +7,12 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from stiction_ros.errors import InputError
+from stiction_ros.records.regular import begun_anew
 from stiction_ros.records.storage.bag_metadata import BagTopic
 from stiction_ros.records.storage.files import listing_notes, storage_files
 from stiction_ros.records.storage.log_time import AGAIN
@@ -71,24 +72,10 @@ def _by_log_time(scan: McapScan) -> Iterator[RawMessage]:
 
 def _begins_anew(messages: Iterable[RawMessage]) -> bool:
     """Tell whether log time begins anew, as simulated time does when a plant is restarted."""
-    known: dict[str, list[int]] = {}
-    older: dict[str, list[int]] = {}
+    times: dict[str, list[int]] = {}
     for topic, time, _, _ in messages:
-        times, run = known.setdefault(topic.name, []), older.setdefault(topic.name, [])
-        if not times or time >= times[-1]:
-            times.append(time)
-            run.clear()
-            continue
-        bisect.insort(times, time)
-        if run and time <= run[-1]:
-            run.clear()
-        run.append(time)
-        if len(run) == AGAIN:
-            between = bisect.bisect_right(times, time) - bisect.bisect_left(times, run[0])
-            if between > AGAIN:
-                return True
-            run.clear()
-    return False
+        times.setdefault(topic.name, []).append(time)
+    return any(len(begun_anew(np.array(one), AGAIN)) > 1 for one in times.values())
 
 
 def read_messages(
