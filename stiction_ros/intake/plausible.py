@@ -141,26 +141,24 @@ def refuse_swapped(block: Block, *otherwise: str) -> None:
     :mod:`stiction_ros.identification.problem.input_checks` knows more.
     """
     op, pv, sp = (_only(block, signal) for signal in ("op", "pv", "sp"))
-    if op is None or pv is None:
+    if op is None or pv is None or (sp is None and block.of("sp")):
         return
-    if block.of("sp"):
-        if sp is not None and _stays_near(sp[1], op[1], pv[1]):
+    known = [values for _, values in (op, pv, *([sp] if sp else []))]
+    there = np.isfinite(known).all(axis=0)
+    if np.count_nonzero(there) < FEWEST:
+        return
+    output, measured, *rest = (values[there] for values in known)
+    if sp is not None:
+        if np.ptp(measured) > 0.0 and nearness(rest[0], output, measured) is not None:
             said = f"{op[0]} stays near the set-point {sp[0]}, {pv[0]} does not"
             raise _swapped(block, said, otherwise)
         return
     for stride in STRIDES:
-        right, wrong = _explained(op[1], pv[1], stride), _explained(pv[1], op[1], stride)
+        right = explained(output, measured[:, None], stride)
+        wrong = explained(measured, output[:, None], stride)
         if wrong > FOLLOWS and 1.0 - right > LEADS * (1.0 - wrong):
             said = f"{pv[0]} moves as a controller's output would, by {op[0]}"
             raise _swapped(block, said, otherwise)
-
-
-def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
-    """Return whether ``one`` stays near the set-point and ``other``, which moves, does not."""
-    there = np.isfinite(sp) & np.isfinite(one) & np.isfinite(other)
-    if np.count_nonzero(there) < FEWEST or not np.ptp(other[there]) > 0.0:
-        return False
-    return nearness(sp[there], one[there], other[there]) is not None
 
 
 def _swapped(block: Block, reason: str, otherwise: Sequence[str]) -> InputError:
@@ -184,11 +182,3 @@ def _only(block: Block, signal: str) -> tuple[str, FloatArray] | None:
     """Return name and values of the one signal of its kind; None when there are others."""
     found = list(block.of(signal).values())
     return (found[0].name, found[0].values[:EXAMINED]) if len(found) == 1 else None
-
-
-def _explained(output: FloatArray, measured: FloatArray, stride: int) -> float:
-    """Return which share of the moves of ``output`` over ``stride`` samples a PI law explains."""
-    there = np.isfinite(output) & np.isfinite(measured)
-    if np.count_nonzero(there) < FEWEST:
-        return 0.0
-    return explained(output[there], measured[there, None], stride)

@@ -12,7 +12,7 @@ from mcap.records import Channel, Header, McapRecord, Message, Metadata, Schema
 
 from stiction_ros import __version__
 from stiction_ros.checks import one_of
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.records.bag.finish import ROSBAG2, finish_bag, metadata_record, storage_path
 from stiction_ros.records.bag.run_metadata import RUN, news
 from stiction_ros.records.storage.bag_metadata import BagTopic, Qos, qos_yaml
@@ -266,12 +266,10 @@ class BagWriter:
 def _make_empty(directory: Path) -> None:
     where = str(directory)
     fix = "choose another place or move it away"
-    try:
+    if directory.is_file():
+        raise InputError("is a file, a bag is a directory", where=where, fix=fix)
+    with storing(where, what="made"):
         directory.mkdir(parents=True, exist_ok=True)
         full = next(directory.iterdir(), None) is not None
-    except FileExistsError:
-        raise InputError("is a file, a bag is a directory", where=where, fix=fix) from None
-    except OSError as error:
-        raise InputError(f"cannot be made ({error.strerror})", where=where) from None
     if full:
         raise InputError("exists and is not empty", where=where, fix=fix)
