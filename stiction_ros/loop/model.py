@@ -13,7 +13,7 @@ from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.effects import from_mapping as effect_from_mapping
 from stiction_ros.errors import InputError, foreign
 from stiction_ros.loop.places import append_effect, at_place, read_effects
-from stiction_ros.loop.yaml_process import Instrument, read_instruments, read_process
+from stiction_ros.loop.yaml_process import Instrument, read_process
 from stiction_ros.loop.yaml_reading import Section, load_yaml, parse_yaml
 from stiction_ros.processes import Process
 
@@ -134,7 +134,7 @@ class LoopModel:
             raise InputError("needs at least one valve, each with a name of its own", where=where)
         section = top.section("process")
         point = top.section("operating_point", {})
-        process = read_process(section, point, tags, sample_time)
+        process, instruments = read_process(section, point, tags, sample_time)
         if len(set(process.outputs)) != len(process.outputs):
             raise InputError(
                 "two outputs have one name", where=section.at("outputs"), fix="rename one"
@@ -169,7 +169,7 @@ class LoopModel:
             pv_start,
             controller,
             provenance,
-            read_instruments(section, process.outputs),
+            instruments,
             copy.deepcopy(dict(document)),
         )
 

@@ -27,26 +27,68 @@ class Instrument:
     rate_limit: float = math.inf  # fastest credible change of the measurement, units per second
 
 
+@dataclasses.dataclass(frozen=True)
+class _Output:
+    """What a process of any kind says of one output."""
+
+    name: str
+    noise: processes.Noise = processes.Noise()
+    effects: tuple[Behaviour, ...] = ()  # on the side of the process
+    instrument: Instrument = Instrument()
+
+
 def read_process(
     section: Section, point: Section, valves: tuple[str, ...], sample_time: float
-) -> processes.Process:
-    """Build the process; ``point`` is the loop's operating point, read for linear kinds."""
+) -> tuple[processes.Process, tuple[Instrument, ...]]:
+    """Build the process; return it with the instrument of each output.
+
+    The ``point`` is the loop's operating point, read for linear kinds.
+    """
     kind = section.choice("kind", _KINDS)
     if kind == "transfer_function":
         section = _as_arx(section, valves, sample_time)
         section.choice("kind", _KINDS)
-    if kind in ("arx", "transfer_function"):
-        process = _read_arx(section, point, valves)
-    elif kind == "state_space":
-        process = _read_state_space(section, point, valves)
+    if kind == "stirred_tank" and "outputs" not in section:
+        entries, outputs = [], [_Output("C"), _Output("T")]
     else:
-        process = _read_tank(section, point, valves, sample_time)
-    section.finish()
-    effects = tuple(_read_filters(entry) for entry in section.sections("outputs", []))
-    return processes.AlteredProcess(process, effects, sample_time) if any(effects) else process
+        entries = list(section.sections("outputs"))
+        outputs = [_read_output(entry) for entry in entries]
+    process: processes.Process
+    if kind in ("arx", "transfer_function"):
+        process = _read_arx(section, entries, outputs, point, valves)
+    elif kind == "state_space":
+        process = _read_state_space(section, outputs, point, valves)
+    else:
+        process = _read_tank(section, outputs, point, valves, sample_time)
+    for each in (*entries, section):
+        each.finish()
+    effects = tuple(output.effects for output in outputs)
+    if any(effects):
+        process = processes.AlteredProcess(process, effects, sample_time)
+    return process, tuple(output.instrument for output in outputs)
 
 
-def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> processes.Process:
+def _read_output(entry: Section) -> _Output:
+    name, noise, effects = entry.text("name"), _read_noise(entry), read_effects(entry, "process")
+    for i, effect in enumerate(effects):
+        if effect.filter(1.0) is None:
+            raise InputError(
+                f"{effect.title()} cannot act on a process",
+                where=f"{entry.at('effects')}[{i}]",
+                fix="use gain, delay, pole or leak, or put it to a valve or a sensor",
+            )
+    low, high = entry.ends("range") if "range" in entry else (-math.inf, math.inf)
+    rate = entry.number("rate_limit", above=0.0) if "rate_limit" in entry else math.inf
+    return _Output(name, noise, effects, Instrument(low, high, rate))
+
+
+def _read_arx(
+    section: Section,
+    entries: list[Section],
+    outputs: list[_Output],
+    point: Section,
+    valves: tuple[str, ...],
+) -> processes.Process:
     if "measured_disturbances" in section and section.raw("measured_disturbances"):
         raise InputError(
             "an arx process has no measured disturbances",
@@ -54,8 +96,7 @@ def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> proc
             fix="use kind: state_space with a matrix e",
         )
     equations = []
-    for entry in section.sections("outputs"):
-        name = entry.text("name")
+    for entry, output in zip(entries, outputs, strict=True):
         b_section, delays = entry.section("b"), entry.section("delay", {})
         b = {v: tuple(b_section.numbers(v).tolist()) for v in valves if v in b_section}
         b_section.finish()
@@ -63,42 +104,32 @@ def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> proc
             raise InputError("names no valve", where=b_section.where)
         delay = {v: delays.integer(v, 0) for v in b}
         delays.finish()
-        _read_elsewhere(entry)
+        a, bias = tuple(entry.numbers("a").tolist()), entry.number("bias", 0.0)
         try:
-            equation = processes.ArxOutput(
-                name,
-                tuple(entry.numbers("a").tolist()),
-                b,
-                delay,
-                entry.number("bias", 0.0),
-                _read_noise(entry),
-            )
+            equations.append(processes.ArxOutput(output.name, a, b, delay, bias, output.noise))
         except InputError as error:
             raise error.within(entry.where) from None
-        entry.finish()
-        equations.append(equation)
     if not equations:
         raise InputError("has no output", where=section.at("outputs"))
-    names = tuple(equation.name for equation in equations)
-    op0, pv0 = _read_point(point, valves, names)
+    op0, pv0 = _read_point(point, valves, outputs)
     return processes.ArxProcess(tuple(equations), valves, op0, pv0)
 
 
 def _read_state_space(
-    section: Section, point: Section, valves: tuple[str, ...]
+    section: Section, outputs: list[_Output], point: Section, valves: tuple[str, ...]
 ) -> processes.Process:
-    names, noise = _read_outputs(section, None)
     measured = _read_measured(section)
     a, b, c = section.matrix("a"), section.matrix("b"), section.matrix("c")
     e = section.matrix("e") if "e" in section else np.zeros((len(a), 0))
-    op0, pv0 = _read_point(point, valves, names)
+    op0, pv0 = _read_point(point, valves, outputs)
     entry = section.section("delay", {})
     delays = [entry.integer(valve, 0) for valve in valves]
     entry.finish()
     try:
         model = processes.LinearModel(a, b, c, e, np.zeros(len(a)), op0, pv0)
-        late = model.behind_delays(delays)
-        return processes.StateSpaceProcess(late, valves, names, noise, measured)
+        return processes.StateSpaceProcess(
+            model.behind_delays(delays), valves, *_names_and_noise(outputs), measured
+        )
     except InputError as error:
         raise error.within(section.where) from None
 
@@ -127,9 +158,12 @@ def _as_arx(section: Section, valves: tuple[str, ...], sample_time: float) -> Se
 
 
 def _read_tank(
-    section: Section, point: Section, valves: tuple[str, ...], sample_time: float
+    section: Section,
+    outputs: list[_Output],
+    point: Section,
+    valves: tuple[str, ...],
+    sample_time: float,
 ) -> processes.Process:
-    names, noise = _read_outputs(section, ("C", "T"))
     measured = _read_measured(section)
     values = {}
     for field in dataclasses.fields(processes.TankParameters):
@@ -141,59 +175,17 @@ def _read_tank(
             where=point.where,
             fix="leave operating_point out and give initial instead",
         )
+    parameters = processes.TankParameters(**values)
     try:
         return processes.StirredTank(
-            valves, names, noise, processes.TankParameters(**values), sample_time, measured
+            valves, *_names_and_noise(outputs), parameters, sample_time, measured
         )
     except InputError as error:
         raise error.within(section.where) from None
 
 
-def _read_outputs(
-    section: Section, default: tuple[str, ...] | None
-) -> tuple[tuple[str, ...], tuple[processes.Noise, ...]]:
-    if default is not None and "outputs" not in section:
-        return default, tuple(processes.Noise() for _ in default)
-    names, noise = [], []
-    for entry in section.sections("outputs"):
-        names.append(entry.text("name"))
-        noise.append(_read_noise(entry))
-        _read_elsewhere(entry)
-        entry.finish()
-    return tuple(names), tuple(noise)
-
-
-def _read_elsewhere(entry: Section) -> None:
-    """Pass over what :func:`read_process` and :func:`read_instruments` read of an output."""
-    for key in ("effects", "range", "rate_limit"):
-        entry.raw(key, None)
-
-
-def read_instruments(section: Section, outputs: tuple[str, ...]) -> tuple[Instrument, ...]:
-    """Return the limits of the instrument of each output; ``section`` is the process."""
-    found = {
-        entry.text("name"): _read_instrument(entry) for entry in section.sections("outputs", [])
-    }
-    return tuple(found.get(name, Instrument()) for name in outputs)
-
-
-def _read_instrument(entry: Section) -> Instrument:
-    low, high = entry.ends("range") if "range" in entry else (-math.inf, math.inf)
-    rate = entry.number("rate_limit", above=0.0) if "rate_limit" in entry else math.inf
-    return Instrument(low, high, rate)
-
-
-def _read_filters(entry: Section) -> tuple[Behaviour, ...]:
-    """Return the effects on the process side of one output, which must be linear."""
-    effects = read_effects(entry, "process")
-    for i, effect in enumerate(effects):
-        if effect.filter(1.0) is None:
-            raise InputError(
-                f"{effect.title()} cannot act on a process",
-                where=f"{entry.at('effects')}[{i}]",
-                fix="use gain, delay, pole or leak, or put it to a valve or a sensor",
-            )
-    return effects
+def _names_and_noise(outputs: list[_Output]) -> tuple[tuple[str, ...], tuple[processes.Noise, ...]]:
+    return tuple(output.name for output in outputs), tuple(output.noise for output in outputs)
 
 
 def _read_measured(section: Section) -> tuple[str, ...]:
@@ -222,10 +214,11 @@ def _read_noise(entry: Section) -> processes.Noise:
 
 
 def _read_point(
-    point: Section, valves: tuple[str, ...], outputs: tuple[str, ...]
+    point: Section, valves: tuple[str, ...], outputs: list[_Output]
 ) -> tuple[FloatArray, FloatArray]:
-    stems, pvs = (np.zeros(len(names)) for names in (valves, outputs))
-    return point.named_numbers("op", valves, stems), point.named_numbers("pv", outputs, pvs)
+    names = [output.name for output in outputs]
+    stems, pvs = np.zeros(len(valves)), np.zeros(len(names))
+    return point.named_numbers("op", valves, stems), point.named_numbers("pv", names, pvs)
 
 
 def process_of(system: Any, sample_time: float, dead_time: float) -> dict[str, Any]:
