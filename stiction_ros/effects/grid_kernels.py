@@ -94,26 +94,21 @@ def following_stems(
 
 
 @compiled
-def slope_step(
-    memory: FloatArray, values: FloatArray, dynamic: FloatArray, ends: FloatArray
-) -> None:
-    """Move valves by Choudhury's rules, by a sample, OP and f_D of shape (G,).
+def slope_step(memory: FloatArray, value: float, dynamic: float, band: float, jump: float) -> None:
+    """Move a valve (S, J), its f_D given, by Choudhury's rules, by a sample of OP.
 
-    The memory is χ, u, v, x_ss and both thresholds, below 0 while a valve moves, shape (6, G); the
-    ``ends`` are S and J, shape (2, G).
+    The memory is χ, u, v, x_ss and both thresholds, below 0 while the valve moves.
     """
-    for g in range(len(values)):
-        slope, before = np.sign(values[g] - memory[1, g]), memory[2, g]
-        threshold = memory[4, g] if slope > 0.0 else memory[5, g]
-        if slope != before:
-            if memory[4, g] < 0.0:
-                memory[3, g] = memory[1, g]
-                memory[4, g] = ends[1 if slope == 0.0 and before > 0.0 else 0, g]
-                memory[5, g] = ends[1 if slope == 0.0 and before < 0.0 else 0, g]
-        elif slope != 0.0 and np.abs(values[g] - memory[3, g]) > threshold:
-            memory[0, g] = values[g] - slope * dynamic[g]
-            memory[4, g], memory[5, g] = -1.0, -1.0
-        memory[1, g], memory[2, g] = values[g], slope
+    slope, before = np.sign(value - memory[1]), memory[2]
+    if slope != before:
+        if memory[4] < 0.0:
+            memory[3] = memory[1]
+            memory[4] = jump if slope == 0.0 and before > 0.0 else band
+            memory[5] = jump if slope == 0.0 and before < 0.0 else band
+    elif slope != 0.0 and abs(value - memory[3]) > (memory[4] if slope > 0.0 else memory[5]):
+        memory[0] = value - slope * dynamic
+        memory[4], memory[5] = -1.0, -1.0
+    memory[1], memory[2] = value, slope
 
 
 @compiled
@@ -122,12 +117,12 @@ def choudhury_stems(
 ) -> FloatArray:
     """Return stems of valves (S, J) by Choudhury's rules."""
     out = np.empty((len(values), len(band)))
-    memory, ends = np.zeros((6, len(band))), np.stack((band, jump))
-    memory[0], memory[1], memory[3] = start, start, start
-    memory[4], memory[5] = (band + jump) / 2.0, (band + jump) / 2.0
-    for k in range(len(values)):
-        slope_step(memory, np.full(len(band), values[k]), (band - jump) / 2.0, ends)
-        out[k] = memory[0]
+    for g in range(len(band)):
+        static, dynamic = (band[g] + jump[g]) / 2.0, (band[g] - jump[g]) / 2.0
+        memory = np.array([start[g], start[g], 0.0, start[g], static, static])
+        for k in range(len(values)):
+            slope_step(memory, values[k], dynamic, band[g], jump[g])
+            out[k, g] = memory[0]
     return out
 
 

@@ -1,11 +1,11 @@
-"""Loops of controllers, sticky valves and a linear process, many at once, compiled.
+"""Loops of controllers, sticky valves and a linear process, compiled.
 
 A valve without a controller keeps its OP.
 """
 
 import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,13 +30,14 @@ class Process(NamedTuple):
 
 
 class Controllers(NamedTuple):
-    """One controller per valve; what is the same in all runs."""
+    """One controller per valve."""
 
     output: IntArray  # index of the output that it reads, −1 for none, shape (m,)
     lag: IntArray  # samples between PV and OP, shape (m,)
     smoothing: FloatArray  # share of the last value in the filter of e, shape (m,)
     low: FloatArray  # low, high: limits of OP, shape (m,)
     high: FloatArray
+    tuning: FloatArray  # (K, K_i, K_d), shape (m, 3)
 
     @classmethod
     def of(cls, pairs: Pairs) -> "Controllers":
@@ -44,162 +45,134 @@ class Controllers(NamedTuple):
         outputs, laws = zip(*pairs, strict=True)
         low, high = np.array([law.limits for law in laws]).T.copy()
         smoothing = np.array([law.smoothing for law in laws])
-        return cls(np.array(outputs), np.array([law.lag for law in laws]), smoothing, low, high)
+        tuning = np.array([law.coefficients for law in laws])
+        lags = np.array([law.lag for law in laws])
+        return cls(np.array(outputs), lags, smoothing, low, high, tuning)
 
 
-class Runs(NamedTuple):
-    """What differs from run to run, R runs."""
+class Valves(NamedTuple):
+    """The stems of m valves, which follow He's law (4) unless their laws say otherwise."""
 
-    friction: FloatArray  # (f_S, f_D), shape (R, m, 2)
-    tuning: FloatArray  # (K, K_i, K_d), shape (R, m, 3)
-    pv: FloatArray  # before the first sample, oldest first, shape (R, H, p)
-    stem: FloatArray  # before the first sample, oldest first, shape (R, H, m)
-    op: FloatArray  # the last one before the first sample, shape (R, m)
-    # per valve, whether Kano's or Choudhury's rules move its stem in place of He's law (4), and by
-    # which factor a slip is longer than He's, shape (m, 3)
+    friction: FloatArray  # (f_S, f_D), shape (m, 2)
+    # whether Kano's or Choudhury's rules move the stem, and by which factor a slip is longer than
+    # He's, shape (m, 3)
     laws: FloatArray
 
 
-@compiled
+class Start(NamedTuple):
+    """What was before the first sample, the oldest first."""
+
+    pv: FloatArray  # shape (H, p)
+    stem: FloatArray  # shape (H, m)
+    op: FloatArray  # the last one, shape (m,)
+
+
 def command(
-    op: FloatArray,
-    error: FloatArray,
-    tuning: FloatArray,
-    now: FloatArray,
-    share: float,
-    low: float,
-    high: float,
-) -> None:
-    r"""Move OP by a sample, by the velocity form of a controller.
+    op: Any, errors: tuple[Any, Any], tuning: Any, now: Any, filtered: tuple[float, float, float]
+) -> tuple[Any, tuple[Any, Any]]:
+    r"""Return OP of the next sample by the velocity form of a controller, and the errors then.
 
     .. math:: u_k = u_{k-1} + K \Delta e_k + K_i e_k + K_d (\Delta e_k - \Delta e_{k-1})
 
-    e is behind its filter, and OP is clipped to its limits.
+    e is behind its filter, and OP is clipped to its limits. Of one run or of all at once: each
+    argument is a number, or an array of one for each run.
 
     Args:
-        op: of the sample before, shape (R,).
-        error: e of the sample before and of that before it, shape (2, R).
-        tuning: (K, K_i, K_d), shape (3, R).
-        now: SP − PV that the controller reads, shape (R,).
-        share: of the last value in the filter of e.
-        low, high: limits of OP.
+        op: of the sample before.
+        errors: e of the sample before and of that before it.
+        tuning: (K, K_i, K_d).
+        now: SP − PV that the controller reads.
+        filtered: share of the last value in the filter of e, and the limits of OP.
     """
-    for run in range(len(op)):
-        before = error[0, run]
-        e = share * before + (1.0 - share) * now[run]
-        change = e - before
-        moved = op[run] + tuning[0, run] * change
-        moved += tuning[1, run] * e
-        moved += tuning[2, run] * (change - before + error[1, run])
-        moved = low if moved < low else moved
-        op[run] = high if moved > high else moved
-        error[1, run] = before
-        error[0, run] = e
+    (before, older), (share, low, high) = errors, filtered
+    e = share * before + (1.0 - share) * now
+    change = e - before
+    moved = op + tuning[0] * change + tuning[1] * e + tuning[2] * (change - before + older)
+    return np.minimum(np.maximum(moved, low), high), (e, before)
+
+
+_command = compiled(command)
 
 
 @compiled
-def run_loops(
-    process: Process, controllers: Controllers, runs: Runs, sp: FloatArray, load: FloatArray
+def run_loop(
+    process: Process,
+    controllers: Controllers,
+    valves: Valves,
+    start: Start,
+    outside: tuple[FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return OP, shape (R, n, m), and PV, shape (R, n, p).
-
-    All runs go side by side, each computed as it would be alone.
+    """Return OP, shape (n, m), and PV, shape (n, p), of a loop; infinite from where it is gone.
 
     Args:
-        process: of all runs.
-        controllers: of all runs.
-        runs: H, the samples before the first, is at least na, nb + the longest delay and 3 + the
-            longest lag.
-        sp: set-points, shape (R, H + n, p).
-        load: added to PV behind the process, shape (R, H + n, p).
+        process: of the loop.
+        controllers: of the loop.
+        valves: of the loop.
+        start: H samples, at least na, nb + the longest delay and 3 + the longest lag.
+        outside: set-points, and what is added to PV behind the process, shape (H + n, p) each.
     """
-    number, past, outputs = runs.pv.shape
-    valves, whole = runs.stem.shape[2], sp.shape[1]
-    na, nb = process.a.shape[1], process.b.shape[2]
-    y, stem = np.empty((whole, outputs, number)), np.empty((whole, valves, number))
-    y[:past], stem[:past] = runs.pv.transpose(1, 2, 0), runs.stem.transpose(1, 2, 0)
-    wanted = np.ascontiguousarray(sp.transpose(1, 2, 0))
-    added = np.ascontiguousarray(load.transpose(1, 2, 0))
-    friction = np.ascontiguousarray(runs.friction.transpose(1, 2, 0))
-    tuning = np.ascontiguousarray(runs.tuning.transpose(1, 2, 0))
-    u, error = np.ascontiguousarray(runs.op.T), np.zeros((valves, 2, number))
-    ends, memory = np.empty((valves, 2, number)), np.zeros((valves, 6, number))
-    value, bound = np.empty(number), np.empty(number)
-    op, gone = np.empty((whole, valves, number)), np.zeros(number, dtype=np.int64)
-    for run in range(number):
-        bound[run] = BEYOND * max(1.0, np.abs(y[:past, :, run]).max())
-        for j in range(valves):
-            ends[j, 0, run] = friction[j, 0, run] + friction[j, 1, run]
-            ends[j, 1, run] = friction[j, 0, run] - friction[j, 1, run]
-            at = stem[past - 1, j, run]
-            way = np.sign(at - stem[past - 2, j, run])  # it moves on, or rests
-            memory[j, 0, run], memory[j, 3, run] = at, at
-            memory[j, 1, run], memory[j, 2, run] = u[j, run], way
-            memory[j, 4:, run] = friction[j, 0, run] if way == 0.0 else -1.0
-            i = controllers.output[j]
-            if i >= 0:
-                late = past - 1 - controllers.lag[j]
-                share = controllers.smoothing[j]
-                e = wanted[late - 2, i, run] - y[late - 2, i, run] - added[late - 2, i, run]
-                for k in range(late - 2, late + 1):
-                    away = wanted[k, i, run] - y[k, i, run] - added[k, i, run]
-                    e = share * e + (1.0 - share) * away
-                    error[j, 1, run] = error[j, 0, run]
-                    error[j, 0, run] = e
+    (sp, load), (friction, laws) = outside, valves
+    (past, outputs), whole = start.pv.shape, len(sp)
+    y, stem = np.empty((whole, outputs)), np.empty((whole, len(laws)))
+    y[:past], stem[:past] = start.pv, start.stem
+    u, error, memory = start.op.copy(), np.zeros((len(laws), 2)), np.zeros((len(laws), 6))
+    op, bound = np.full((whole, len(laws)), np.inf), BEYOND * max(1.0, np.abs(start.pv).max())
+    for j, i in enumerate(controllers.output):
+        at = stem[past - 1, j]
+        way = np.sign(at - stem[past - 2, j])  # it moves on, or rests
+        memory[j, 0], memory[j, 1], memory[j, 2], memory[j, 3] = at, u[j], way, at
+        memory[j, 4:] = friction[j, 0] if way == 0.0 else -1.0
+        if i >= 0:
+            late, share = past - 1 - controllers.lag[j], controllers.smoothing[j]
+            e = sp[late - 2, i] - y[late - 2, i] - load[late - 2, i]
+            for k in range(late - 2, late + 1):
+                e = share * e + (1.0 - share) * (sp[k, i] - y[k, i] - load[k, i])
+                error[j, 1], error[j, 0] = error[j, 0], e
+    gone = False
     for k in range(past, whole):
         for i in range(outputs):
-            for run in range(number):
-                value[run] = process.bias[i]
-            for lag in range(na):
-                factor = process.a[i, lag]
-                for run in range(number):
-                    value[run] -= factor * y[k - 1 - lag, i, run]
-            for j in range(valves):
+            value = process.bias[i]
+            for lag in range(process.a.shape[1]):
+                value -= process.a[i, lag] * y[k - 1 - lag, i]
+            for j in range(len(laws)):
                 shift = k - 1 - process.delay[i, j]
-                for lag in range(nb):
-                    factor = process.b[i, j, lag]
-                    for run in range(number):
-                        value[run] += factor * stem[shift - lag, j, run]
-            for run in range(number):
-                y[k, i, run] = value[run]
-                if gone[run] == 0 and not abs(value[run]) < bound[run]:
-                    gone[run] = k
-        for j in range(valves):
-            i = controllers.output[j]
+                for lag in range(process.b.shape[2]):
+                    value += process.b[i, j, lag] * stem[shift - lag, j]
+            y[k, i] = value
+            gone = gone or not abs(value) < bound
+        for j, i in enumerate(controllers.output):
             if i >= 0:
-                late, share = k - controllers.lag[j], controllers.smoothing[j]
-                low, high = controllers.low[j], controllers.high[j]
-                for run in range(number):
-                    value[run] = wanted[late, i, run] - y[late, i, run] - added[late, i, run]
-                command(u[j], error[j], tuning[j], value, share, low, high)
-            follows, slopes, factor = runs.laws[j, 0], runs.laws[j, 1], runs.laws[j, 2]
+                late = k - controllers.lag[j]
+                now = sp[late, i] - y[late, i] - load[late, i]
+                errors = error[j, 0], error[j, 1]
+                filtered = controllers.smoothing[j], controllers.low[j], controllers.high[j]
+                u[j], errors = _command(u[j], errors, controllers.tuning[j], now, filtered)
+                error[j, 0], error[j, 1] = errors
+            op[k, j] = u[j]
+            static, dynamic = friction[j]
+            follows, slopes, factor = laws[j]
             if slopes:
-                slope_step(memory[j], u[j], friction[j, 1], ends[j])
-            for run in range(number):
-                op[k, j, run] = u[j, run]
-                apart = u[j, run] - stem[k - 1, j, run]
-                still = abs(apart) <= friction[j, 0, run]
-                slip = -friction[j, 1, run] if apart > 0.0 else friction[j, 1, run]
-                if follows:
-                    goes_on = memory[j, 2, run] * (u[j, run] - memory[j, 1, run]) > 0.0
-                    if not goes_on:
-                        memory[j, 2, run] = 0.0 if still else np.sign(apart)
-                    still = still and not goes_on
-                    slip = -memory[j, 2, run] * friction[j, 1, run]
-                    memory[j, 1, run] = u[j, run]
-                slipped = u[j, run] + slip
-                if factor != 1.0 and friction[j, 0, run] > 0.0:
-                    slipped = stem[k - 1, j, run] + factor * (apart + slip)
-                stem[k, j, run] = stem[k - 1, j, run] if still else slipped
-                if slopes and friction[j, 0, run] > 0.0:
-                    stem[k, j, run] = memory[j, 0, run]
-    seen = y + added
-    for run in range(number):
-        if gone[run]:
-            op[gone[run] + 1 :, :, run] = np.inf
-            seen[gone[run] + 1 :, :, run] = np.inf
-    op, seen = op[past:].transpose(2, 0, 1), seen[past:].transpose(2, 0, 1)
-    return np.ascontiguousarray(op), np.ascontiguousarray(seen)
+                slope_step(memory[j], u[j], dynamic, static + dynamic, static - dynamic)
+            apart = u[j] - stem[k - 1, j]
+            still = abs(apart) <= static
+            slip = -dynamic if apart > 0.0 else dynamic
+            if follows:
+                goes_on = memory[j, 2] * (u[j] - memory[j, 1]) > 0.0
+                if not goes_on:
+                    memory[j, 2] = 0.0 if still else np.sign(apart)
+                still = still and not goes_on
+                slip = -memory[j, 2] * dynamic
+                memory[j, 1] = u[j]
+            slipped = u[j] + slip
+            if factor != 1.0 and static > 0.0:
+                slipped = stem[k - 1, j] + factor * (apart + slip)
+            stem[k, j] = stem[k - 1, j] if still else slipped
+            if slopes and static > 0.0:
+                stem[k, j] = memory[j, 0]
+        if gone:
+            y[k + 1 :] = np.inf
+            break
+    return op[past:], y[past:] + load[past:]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,7 +9,7 @@ its valve, which may be any law.
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -82,23 +82,25 @@ class RecoveredControl:
         The ``tunings`` are (K, K_i, K_d), shape (R, m, 3). A valve without one of the
         ``controllers`` keeps the recorded OP.
         """
-        self._rows = list(zip(*(each.tolist() for each in controllers), strict=True))
+        columns = (each.tolist() for each in controllers[:5])
+        self._rows = [(i, lag, tuple(rest)) for i, lag, *rest in zip(*columns, strict=True)]
         self._sp = sp
-        self._tunings = np.ascontiguousarray(tunings.transpose(1, 2, 0))
-        self._errors = np.empty((len(controllers.output), 2, len(tunings)))
+        self._tunings = tunings.transpose(1, 2, 0)
         away = sp[: len(pv)] - pv
-        for j, (output, lag, share, _, _) in enumerate(self._rows):
-            past = smoothed(np.ascontiguousarray(away[: len(pv) - lag, output]), share)
-            self._errors[j] = past[:-3:-1, None]
+        pasts = [
+            smoothed(np.ascontiguousarray(away[: len(pv) - lag, output]), share)
+            for output, lag, (share, *_) in self._rows
+        ]
+        self._errors: list[tuple[Any, Any]] = [(past[-1], past[-2]) for past in pasts]
 
     def __call__(self, k: int, pv: FloatArray, op: FloatArray) -> None:
         """Set OP of sample k, see :data:`Control`."""
-        for j, (output, lag, share, low, high) in enumerate(self._rows):
-            if output >= 0:
-                moved = op[:, k - 1, j].copy()
-                now = self._sp[k - lag, output] - pv[:, k - lag, output]
-                command(moved, self._errors[j], self._tunings[j], now, share, low, high)
-                op[:, k, j] = moved
+        for j, (i, lag, filtered) in enumerate(self._rows):
+            if i >= 0:
+                now, before = self._sp[k - lag, i] - pv[:, k - lag, i], op[:, k - 1, j]
+                op[:, k, j], self._errors[j] = command(
+                    before, self._errors[j], self._tunings[j], now, filtered
+                )
 
 
 def run_again(

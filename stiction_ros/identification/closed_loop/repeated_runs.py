@@ -11,7 +11,7 @@ from stiction_ros.effects.friction.moving_rules import MovingRules
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run, set_points_of
 from stiction_ros.identification.friction import find_law
 from stiction_ros.identification.result import ValveEstimate
-from stiction_ros.loop.linear_loops import Controllers, Pairs, Process, Runs, run_loops
+from stiction_ros.loop.linear_loops import Controllers, Pairs, Process, Start, Valves, run_loop
 from stiction_ros.signals.oscillation import REGULAR, moving, oscillation, size
 from stiction_ros.signals.spectral_lines import fitted_lines
 
@@ -203,21 +203,17 @@ class Repeated:
             first: row, which H samples follow as recorded.
             sp: set-points from there on, shape (n, p).
             frictions: shape (R, m, 2).
-            load: shape (R or 1, n, p).
+            load: shape (R, n, p).
         """
-        number, past = len(frictions), self.past
-        rows = slice(first, first + past)
-        runs = Runs(
-            np.ascontiguousarray(frictions),
-            np.repeat(np.array([law.coefficients for _, law in self.pairs])[None], number, axis=0),
-            np.repeat(self.simulated[rows][None], number, axis=0),
-            np.repeat(self.loop.stem[rows][None], number, axis=0),
-            np.repeat(self.loop.op[first + past - 1][None], number, axis=0),
-            self.laws,
-        )
-        repeated = np.repeat(sp[None], number, axis=0)
-        outside = np.ascontiguousarray(load)
-        return run_loops(self.process, Controllers.of(self.pairs), runs, repeated, outside)
+        rows, controllers = slice(first, first + self.past), Controllers.of(self.pairs)
+        before = self.simulated[rows], self.loop.stem[rows], self.loop.op[rows.stop - 1]
+        start, sp = Start(*map(np.ascontiguousarray, before)), np.ascontiguousarray(sp)
+        runs = [
+            run_loop(self.process, controllers, Valves(friction, self.laws), start, (sp, noise))
+            for friction, noise in zip(frictions, load, strict=True)
+        ]
+        op, pv = zip(*runs, strict=True)
+        return np.array(op), np.array(pv)
 
 
 def gone(stuck: float, free: float) -> float:
