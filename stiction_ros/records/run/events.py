@@ -1,4 +1,4 @@
-"""What the nodes of a live loop said besides its signals: estimates, modes, gaps, texts."""
+"""What the nodes of a live loop said besides its signals: modes, fits, gaps, texts."""
 
 import contextlib
 import dataclasses

@@ -1,4 +1,4 @@
-"""What a bag of the live loop tells besides its record: estimates, modes, configuration."""
+"""What a bag of the live loop tells besides its record: fits, modes, configuration."""
 
 import dataclasses
 import itertools
