@@ -24,7 +24,7 @@ from stiction_ros.report.run import identified
 from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import Story, tell
-from stiction_ros.report.run.summary import measured, messages, summary, work_rows
+from stiction_ros.report.run.summary import messages, summary
 from stiction_ros.texts import moment, spoken
 
 _SCORES = (
@@ -32,6 +32,7 @@ _SCORES = (
     ("offset", "offset", ""),
     ("iae_per_hour", "IAE per hour", "·h/h"),
 )
+_WORK = (("travel", "travel, %/h"), ("moves", "moves/h"), ("reversals", "reversals/h"))
 
 
 def run_page(story: Story) -> str:
@@ -50,7 +51,6 @@ def run_page(story: Story) -> str:
         *[f'<p class="lead">{words(line)}</p>' for line in findings(story)],
         identified.valve_cards(story.identified.get("valves", []), story),
         _gain(story),
-        _work(story),
         *draw_run(story),
         _fits(story),
         monitor_section(story.log),
@@ -130,77 +130,77 @@ def _trouble(story: Story) -> str:
 
 def _gone(story: Story) -> bool:
     """Tell whether every output's cycle has fallen below a fifth of what it was."""
-    ratios = [_ratio(story, name, "amplitude") for name in story.record.outputs]
+    ratios = _amplitudes(story).values()
     return bool(ratios) and all(ratio is not None and ratio < 0.2 for ratio in ratios)
 
 
-def _ratio(story: Story, output: str, key: str) -> float | None:
+def _amplitudes(story: Story) -> dict[str, float | None]:
+    """Return the amplitude of each output after the swap over that before."""
     before, after = story.phases.before, story.phases.after
     if before is None or after is None:
-        return None
-    was, now = getattr(before.scores[output], key), getattr(after.scores[output], key)
+        return {}
+    return {
+        name: _ratio(after.scores[name].amplitude, before.scores[name].amplitude)
+        for name in story.record.outputs
+    }
+
+
+def _ratio(now: float | None, was: float | None) -> float | None:
     return None if was is None or now is None or was <= 0 else float(now / was)
 
 
+def _judged(ratio: float) -> str:
+    return "good" if ratio < 1 else "bad"
+
+
 def _changes(story: Story) -> str:
-    parts = []
-    for name in story.record.outputs:
-        ratio = _ratio(story, name, "amplitude")
-        if ratio is not None:
-            parts.append(f"of {name} to {100 * ratio:.0f} %")
-    return f"The swap took the amplitude {' and '.join(parts)} of what it was." if parts else ""
+    told = [
+        f"of {name} to {100 * ratio:.0f} %"
+        for name, ratio in _amplitudes(story).items()
+        if ratio is not None
+    ]
+    return f"The swap took the amplitude {' and '.join(told)} of what it was." if told else ""
 
 
 def _gain(story: Story) -> str:
-    """Return the table of scores before, after and without friction."""
+    """Return the table of scores and of the work of the valves, before, after and without."""
     before, after, free = story.phases.before, story.phases.after, story.stiction_free
     if before is None:
         return ""
-    head = ["PV", "score", "before"]
-    if after is not None:
-        head += ["after", "after / before"]
-    if free is not None:
-        head += ["without friction", "after / without"]
+    phases = [phase for phase in (before, after, free) if phase is not None]
+    head = ["", "", "before"]
+    head += ["after", "after / before"] if after is not None else []
+    head += ["without friction", "after / without"] if free is not None else []
+    told: list[tuple[str, str, list[float | None]]] = [
+        (name, f"{label}, {unit}{per}", [getattr(phase.scores[name], key) for phase in phases])
+        for name in story.record.outputs
+        for unit in [story.units.get(name, "PV units")]
+        for key, label, per in _SCORES
+    ]
+    told += [
+        (valve, label, [getattr(phase.work.get(valve), key, None) for phase in phases])
+        for valve in story.record.valves
+        for key, label in _WORK
+    ]
+    told += [
+        (valve, "largest OP step, %", [phase.op_step.get(valve) for phase in phases])
+        for valve in story.record.valves
+    ]
     rows: list[list[Cell]] = []
-    for name in story.record.outputs:
-        unit = story.units.get(name, "PV units")
-        for key, label, per in _SCORES:
-            was = getattr(before.scores[name], key)
-            row: list[Cell] = [name, f"{label}, {unit}{per}", number(was)]
-            now = None
-            if after is not None:
-                now = getattr(after.scores[name], key)
-                ratio = _ratio(story, name, key)
-                kind = "" if ratio is None else ("good" if ratio < 1 else "bad")
-                row += [number(now), (kind, "–" if ratio is None else f"{100 * ratio:.0f} %")]
-            if free is not None:
-                ideal = getattr(free.scores[name], key)
-                usable = now is not None and ideal is not None and ideal > 0
-                row += [number(ideal), f"{now / ideal:.2f}" if usable else "–"]
-            rows.append(row)
+    for who, label, (was, *later) in told:
+        row: list[Cell] = [who, label, number(was)]
+        if later:
+            ratio = _ratio(later[0], was)
+            kind = "" if ratio is None or who in story.record.valves else _judged(ratio)
+            row += [number(later[0]), (kind, "–" if ratio is None else f"{100 * ratio:.0f} %")]
+        for ideal in later[1:]:
+            ratio = _ratio(later[0], ideal)
+            row += [number(ideal), "–" if ratio is None else f"{ratio:.2f}"]
+        rows.append(row)
     return (
-        ("<h2>What the swap gained</h2>" if after is not None else "<h2>How the loop does</h2>")
+        ("<h2>What the swap changed</h2>" if after is not None else "<h2>How the loop does</h2>")
         + table(head, rows, texts=2)
         + f'<p class="soft">{text(_spans(story))}</p>'
-    )
-
-
-def _work(story: Story) -> str:
-    """Return the table of what the valves had to do before, after and without friction."""
-    found = story.phases
-    phases = {"before": found.before, "after": found.after, "without friction": story.stiction_free}
-    there = [name for name, phase in phases.items() if phase is not None]
-    if not there:
-        return ""
-    rows: list[list[Cell]] = [
-        [valve, label, *(number(value) for value in told)]
-        for valve, label, told in work_rows(measured(phases), there)
-    ]
-    return (
-        "<h2>What it asks of the valves</h2>"
-        + table(["valve", "", *there], rows, texts=2)
-        + '<p class="soft">Travel: way of the stem. Moves: samples at which it moves; without '
-        "friction it follows the noise. A dash: the stem is not known.</p>"
     )
 
 
@@ -226,7 +226,8 @@ def _spans(story: Story) -> str:
     return text_ + (
         " Amplitude: spectral line at the cycle's period inside the set-point holds. Offset:"
         " |mean error| at the end of the holds. IAE per hour: mean |error| less the share of"
-        " known measurement noise."
+        " known measurement noise. Travel: way of the stem. Moves: samples at which it moves;"
+        " without friction it follows the noise. A dash: the stem is not known."
     )
 
 

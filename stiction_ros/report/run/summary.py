@@ -1,19 +1,12 @@
 """``summary.json`` of a run: the figures that acceptance looks at."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from stiction_ros.report.run.scoring import Phase
 from stiction_ros.report.run.story import Story
 from stiction_ros.texts import finite
-
-KEYS = (
-    ("travel", "travel, %/h"),
-    ("moves", "moves/h"),
-    ("reversals", "reversals/h"),
-    ("op_step", "largest OP step, %"),
-)
 
 
 def summary(
@@ -65,22 +58,3 @@ def messages(
         topic: {"published": published.get(topic), "recorded": recorded.get(topic, 0)}
         for topic in sorted(published.keys() | recorded.keys())
     }
-
-
-def work_rows(
-    summary: Mapping[str, Any], phases: Sequence[str]
-) -> list[tuple[str, str, list[float | None]]]:
-    """Return rows of a valve, a measure and its value in each of ``phases``; None if unknown."""
-    steps, work = summary["largest_op_step"], summary["valve_work"]
-    valves = next((list(steps[name]) for name in phases if name in steps), [])
-    rows = []
-    for valve in valves:
-        for key, label in KEYS:
-            told = [
-                steps.get(name, {}).get(valve)
-                if key == "op_step"
-                else work.get(name, {}).get(valve, {}).get(key)
-                for name in phases
-            ]
-            rows.append((valve, label, told))
-    return rows
