@@ -24,7 +24,7 @@ from stiction_ros.report.run import identified
 from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import Story, tell
-from stiction_ros.report.run.summary import messages, summary
+from stiction_ros.report.run.summary import summary
 from stiction_ros.texts import moment, spoken
 
 _SCORES = (
@@ -55,7 +55,6 @@ def run_page(story: Story) -> str:
         _fits(story),
         monitor_section(story.log),
         identified.process_table(story.identified.get("outputs", []), record.sample_time),
-        _messages(story),
         _configuration(story),
         _notes(story),
     ]
@@ -274,22 +273,6 @@ def _fits(story: Story) -> str:
     ]
     said = f'<p class="soft">Simulated: {words("; ".join(known))}.</p>' if known else ""
     return "<h2>Every fit</h2>" + table(head, rows, texts=3) + said
-
-
-def _messages(story: Story) -> str:
-    counts = messages(story.log.published, story.log.recorded)
-    if not counts:
-        return ""
-    rows: list[list[Cell]] = [
-        [topic, count(found["published"]), count(found["recorded"])]
-        for topic, found in counts.items()
-    ]
-    return (
-        "<h2>Messages</h2>"
-        + table(("topic", "published", "recorded"), rows)
-        + '<p class="soft">Published as the nodes count them in /diagnostics, whose last '
-        "message tells of itself and comes when the bag is closed. A dash: nobody counts.</p>"
-    )
 
 
 def _configuration(story: Story) -> str:
