@@ -9,7 +9,7 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,7 @@ from stiction_ros.texts import probability, spoken
 if TYPE_CHECKING:
     from stiction_ros.survey.entry import Entry
     from stiction_ros.survey.listing.headline import Earlier
-    from stiction_ros.survey.survey import Reached, Survey
+    from stiction_ros.survey.survey import Progress, Survey
 
 LOCAL = "local"  # the engine of this machine
 
@@ -213,7 +213,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 @contextlib.contextmanager
-def progress(found: Iterable[object] | None) -> "Iterator[Callable[[Reached], None]]":
+def progress(found: Iterable[object] | None) -> "Iterator[Progress]":
     """Show how far a survey is: loops that are done, of all that there are.
 
     The loops are found once more, to be counted beside the work; None where reading them twice
@@ -225,12 +225,12 @@ def progress(found: Iterable[object] | None) -> "Iterator[Callable[[Reached], No
         with contextlib.suppress(ValueError, OSError):  # who judges the loops is told as well
             totals.append(sum(1 for _ in loops))
 
-    def tell(reached: "Reached") -> None:
+    def tell(done: int, drawn: int, entry: "Entry") -> None:
         if not totals:
-            show(0.0, f"{reached.done} loops: {reached.entry.name}")
+            show(0.0, f"{done} loops: {entry.name}")
             return
-        total = max(totals[0], reached.drawn)
-        show(reached.done / total, f"{reached.done} of {total} loops: {reached.entry.name}")
+        total = max(totals[0], drawn)
+        show(done / total, f"{done} of {total} loops: {entry.name}")
 
     if found is not None:
         threading.Thread(target=count, args=(found,), daemon=True).start()

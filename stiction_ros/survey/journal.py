@@ -1,8 +1,11 @@
-"""Results as they come, a line each, from which a survey that was broken off goes on."""
+"""The folder of a survey: results as they come, what was decided of each loop, and pages."""
 
 import dataclasses
 import hashlib
+import itertools
 import json
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -12,20 +15,30 @@ from stiction_ros.survey.entry import Entry
 from stiction_ros.texts import json_text
 
 FILE = "loops.jsonl"
+PAGES = "loops"
+LOG = "survey.log"
 
 
 class Journal:
-    """One file; its first line says what the options were, each other one holds a loop."""
+    """Keeps a survey in a folder, from which one that was broken off goes on; or nothing.
 
-    def __init__(self, folder: Path, mark: str, *, resume: bool) -> None:
-        """Open the journal of a folder that is there, by the ``mark`` of the options.
+    The first line of its file says what the options were, each other one holds a loop.
+    """
+
+    def __init__(self, folder: Path | None, mark: str, *, resume: bool) -> None:
+        """Open the journal of a folder by the ``mark`` of the options; None keeps nothing.
 
         What is there counts to ``resume``; else no loop may be there. Another mark is refused.
         """
-        path, whole = folder / FILE, 0
         self.known: dict[str, Entry] = {}
+        self._folder, self._open = folder, list[IO[Any]]()
+        if folder is None:
+            return
+        path, whole = folder / FILE, 0
+        (folder / PAGES).mkdir(parents=True, exist_ok=True)
         path.touch()
-        self._file: IO[bytes] = path.open("r+b")
+        self._file = path.open("r+b")
+        self._open.append(self._file)
         for number, text in enumerate(self._file):
             if not text.endswith(b"\n"):
                 break  # broken off while it was written
@@ -42,6 +55,9 @@ class Journal:
         self._file.truncate()
         if not whole:
             self._write({"survey": 1, "options": mark})
+        self._log = (folder / LOG).open("a" if resume else "w", encoding="utf-8")
+        self._open.append(self._log)
+        self._pages = {Path(entry.report).name for entry in self.known.values() if entry.report}
 
     def _take(self, text: bytes, mark: str, where: str) -> None:
         """Take in a line that is there: what the options were, or a loop."""
@@ -64,9 +80,30 @@ class Journal:
             )
 
     def add(self, key: str, entry: Entry) -> None:
-        """Keep a loop."""
-        self.known[key] = entry
-        self._write({"key": key, "entry": dataclasses.asdict(entry)})
+        """Keep a loop, from which a survey that goes on takes it."""
+        if self._folder is not None:
+            self.known[key] = entry
+            self._write({"key": key, "entry": dataclasses.asdict(entry)})
+
+    def tell(self, name: str, sentences: Sequence[str]) -> None:
+        """Keep what was decided of a loop."""
+        if self._folder is None:
+            return
+        for sentence in sentences:
+            line = " ".join(sentence.split())
+            self._log.write(f"{name}: {line}\n")
+        self._log.flush()
+
+    def with_page(self, entry: Entry, page: str) -> Entry:
+        """Write the page of a loop and return the entry that names it."""
+        if not page or self._folder is None:
+            return entry
+        base = re.sub(r"[^\w.-]+", "_", entry.name).strip("._")[:80] or "loop"
+        names = itertools.chain([base], (f"{base}-{k}" for k in itertools.count(2)))
+        name = next(f"{n}.html" for n in names if f"{n}.html" not in self._pages)
+        self._pages.add(name)
+        (self._folder / PAGES / name).write_text(page, encoding="utf-8")
+        return dataclasses.replace(entry, report=f"{PAGES}/{name}")
 
     def _write(self, line: Any) -> None:
         self._file.write(json_text(line, indent=None).encode() + b"\n")
@@ -76,7 +113,8 @@ class Journal:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
+        for file in self._open:
+            file.close()
 
 
 def key_of(loop: Loop) -> str:
