@@ -26,11 +26,6 @@ def write_page(out: str | Path, page: str, figures: Mapping[str, Any] | None = N
     return target
 
 
-def count(value: object) -> str:
-    """Return a whole number; a dash when there is none."""
-    return str(value) if isinstance(value, int) and not isinstance(value, bool) else "–"
-
-
 def card(kind: str, what: str, big: str, more: str = "") -> str:
     """Return a box with one result; ``kind`` is bad, good, open or nothing."""
     return (

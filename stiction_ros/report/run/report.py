@@ -10,16 +10,7 @@ from stiction_ros.pages.frame import framed, listed, text, words
 from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.events import ModeChange
 from stiction_ros.records.run.log import RunLog
-from stiction_ros.report.page import (
-    Cell,
-    count,
-    folded,
-    interval,
-    number,
-    percent,
-    table,
-    write_page,
-)
+from stiction_ros.report.page import Cell, folded, number, percent, table, write_page
 from stiction_ros.report.run import identified
 from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.scoring import PhaseStatus
@@ -52,7 +43,6 @@ def run_page(story: Story) -> str:
         identified.valve_cards(story.identified.get("valves", []), story),
         _gain(story),
         *draw_run(story),
-        _fits(story),
         monitor_section(story.log),
         identified.process_table(story.identified.get("outputs", []), record.sample_time),
         _configuration(story),
@@ -228,51 +218,6 @@ def _spans(story: Story) -> str:
         " known measurement noise. Travel: way of the stem. Moves: samples at which it moves;"
         " without friction it follows the noise. A dash: the stem is not known."
     )
-
-
-def _fits(story: Story) -> str:
-    """Return every fit of every valve, with the truth where it is known."""
-    log = story.log
-    if not log.fits:
-        return ""
-    rows: list[list[Cell]] = []
-    for fit in log.fits:
-        for valve in fit.identification.get("valves", []):
-            name, verdict = valve["name"], valve["verdict"]
-            trusted = [percent(fit.trusted.get(f"{name}.{key}")) for key in ("f_s", "f_d")]
-            rows.append(
-                [
-                    moment(log.seconds(fit.stamp)),
-                    name,
-                    (identified.KINDS.get(verdict, ""), verdict),
-                    percent(valve["f_s"]),
-                    interval(valve["f_s_interval"]),
-                    percent(valve["f_d"]),
-                    interval(valve["f_d_interval"]),
-                    " / ".join(trusted) if f"{name}.f_s" in fit.trusted else "–",
-                    count(fit.identification.get("samples")),
-                    number(fit.identification.get("seconds"), 2),
-                ]
-            )
-    head = (
-        "window ends",
-        "valve",
-        "verdict",
-        "f_S, %",
-        "interval",
-        "f_D, %",
-        "interval",
-        "trusted f_S / f_D",
-        "samples",
-        "fit took, s",
-    )
-    known = [
-        f"{valve} f_S = {percent(truth[0])} %, f_D = {percent(truth[1])} %"
-        for valve in story.record.valves
-        if (truth := story.true_friction(valve)) is not None
-    ]
-    said = f'<p class="soft">Simulated: {words("; ".join(known))}.</p>' if known else ""
-    return "<h2>Every fit</h2>" + table(head, rows, texts=3) + said
 
 
 def _configuration(story: Story) -> str:
