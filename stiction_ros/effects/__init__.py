@@ -33,9 +33,7 @@ from stiction_ros.effects.disturbance.step import StepDisturbance as StepDisturb
 from stiction_ros.effects.disturbance.triangle import TriangleDisturbance as TriangleDisturbance
 from stiction_ros.effects.friction.choudhury import ChoudhuryStiction as ChoudhuryStiction
 from stiction_ros.effects.friction.he import HeStiction as HeStiction
-from stiction_ros.effects.friction.he_smoothed import SmoothedHeStiction as SmoothedHeStiction
 from stiction_ros.effects.friction.kano import KanoStiction as KanoStiction
-from stiction_ros.effects.friction.kano_smoothed import SmoothedKanoStiction as SmoothedKanoStiction
 from stiction_ros.effects.friction.semi_physical import SemiPhysicalStiction as SemiPhysicalStiction
 from stiction_ros.effects.friction.stiction import FrictionLaw as FrictionLaw
 from stiction_ros.effects.friction.stiction import FrictionPair as FrictionPair

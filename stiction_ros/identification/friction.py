@@ -43,18 +43,11 @@ BOX = 0.12  # of the first box: half its width, as a share of a range
 
 def laws() -> dict[str, type[FrictionLaw]]:
     """Return every law that can be identified, by its name."""
-    return {kind.law: kind for kind in _stictions() if kind.law and not _refusal(kind)}  # type: ignore[misc]
+    return {kind.law: kind for kind in _stictions() if kind.law and issubclass(kind, FrictionLaw)}
 
 
 def _stictions() -> list[type[Behaviour]]:
     return [kind for kind in behaviours() if kind.effect == Stiction.effect]
-
-
-def _refusal(kind: type[Behaviour]) -> str:
-    """Return why a law is not identified; empty when it is."""
-    if not issubclass(kind, FrictionLaw):
-        return "it is not derived from FrictionPair or SlipJumpPair"
-    return kind.not_identified
 
 
 def find_law(name: str) -> type[FrictionLaw]:
@@ -64,11 +57,12 @@ def find_law(name: str) -> type[FrictionLaw]:
         InputError: no such law, or one that is not identified.
     """
     known = laws()
-    for kind in _stictions():
-        if kind.law == name and name not in known:
-            fix = f"known laws: {', '.join(known)}"
-            reason = f"law {name!r} is not identified: {_refusal(kind)}"
-            raise InputError(reason, where="law", fix=fix)
+    if name not in known and any(kind.law == name for kind in _stictions()):
+        raise InputError(
+            f"law {name!r} is not identified: it is not derived from FrictionPair or SlipJumpPair",
+            where="law",
+            fix=f"known laws: {', '.join(known)}",
+        )
     return known[one_of(name, known, "law", "friction law")]
 
 

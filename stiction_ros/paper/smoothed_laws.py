@@ -15,12 +15,64 @@ import numpy as np
 from stiction_ros.compiled import compiled
 from stiction_ros.effects import HeStiction, KanoStiction, SemiPhysicalStiction, XchStiction
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.effects.friction.he_smoothed import smoothed_step
-from stiction_ros.effects.friction.kano_smoothed import kano_step
 from stiction_ros.errors import InputError
 
 OVERSHOOT = 1.99  # K of the semi-physical law, as published
 SMOOTHING = 1e4
+REST = 10.0  # OP that moves by less than REST / τ in a sample rests
+
+
+def smoothed_step(
+    stem: Any, value: Any, frictions: tuple[Any, Any], smoothing: Any, tanh: Any
+) -> Any:
+    r"""Return the next stem position of He's model, its switches replaced by hyperbolic tangents.
+
+    .. math::
+        \chi_k &= \eta_1(e_k) \chi_{k-1} + (1 - \eta_1(e_k)) u_k + \eta_2(e_k) f_D \tag{5} \\
+        \eta_1(e) &= \tfrac12 \tanh(\tau(e + f_S)) + \tfrac12 \tanh(\tau(-e + f_S)) \\
+        \eta_2(e) &= \tfrac12 \tanh(-\tau(e + f_S)) + \tfrac12 \tanh(\tau(-e + f_S)) \tag{6}
+
+    All may be numbers or CasADi expressions, and ``tanh`` is of such.
+    """
+    static, dynamic = frictions
+    error = value - stem
+    above = tanh(smoothing * (error + static))
+    below = tanh(smoothing * (-error + static))
+    stays = 0.5 * above + 0.5 * below
+    direction = -0.5 * above + 0.5 * below
+    return stays * stem + (1.0 - stays) * value + direction * dynamic
+
+
+def kano_step(memory: Any, value: Any, figures: tuple[Any, Any, Any], tanh: Any) -> tuple[Any, Any]:
+    r"""Return χ and d of Kano's model, made differentiable in the way of (5) and (6).
+
+    With the memory (χ, u, d), d = 0 at rest, the figures (f_S, f_D, τ), e_k = u_k − χ_{k−1} and
+    σ(z) = ½(1 + tanh z)
+
+    .. math::
+        a^\pm &= \sigma(\tau(\pm d_{k-1} - \tfrac12))\, \sigma(\pm\tau(u_k - u_{k-1}) - 10)
+            && \text{goes on} \\
+        b^\pm &= (1 - a^+ - a^-)\, \sigma(\tau(\pm e_k - f_S)) && \text{slips} \\
+        w^\pm &= a^\pm + b^\pm, \quad d_k = w^+ - w^- \\
+        \chi_k &= (1 - w^+ - w^-) \chi_{k-1} + w^+ (u_k - f_D) + w^- (u_k + f_D)
+
+    For a^± = 0 this is (5) and (6). The weights are positive and sum to one, so χ never leaves the
+    range of its three modes.
+    """
+    stem, last, direction = memory[0], memory[1], memory[2]
+    static, dynamic, tau = figures
+
+    def switch(z: Any) -> Any:
+        return 0.5 + 0.5 * tanh(z)
+
+    move, error = tau * (value - last), value - stem
+    up = switch(tau * (direction - 0.5)) * switch(move - REST)
+    down = switch(tau * (-direction - 0.5)) * switch(-move - REST)
+    stopped = 1.0 - up - down
+    up = up + stopped * switch(tau * (error - static))
+    down = down + stopped * switch(tau * (-error - static))
+    moved = up * (value - dynamic) + down * (value + dynamic)
+    return (1.0 - up - down) * stem + moved, up - down
 
 
 @dataclasses.dataclass(frozen=True)

@@ -32,9 +32,8 @@ OWNERS = {
 
 
 def laws() -> tuple[str, ...]:
-    """Return the friction laws that can be identified: all but the paper's smoothed ones."""
-    kinds = [kind for kind in behaviours() if issubclass(kind, Stiction)]
-    return tuple(kind.law for kind in kinds if kind.law and not kind.not_identified)
+    """Return the friction laws that can be identified."""
+    return tuple(kind.law for kind in behaviours() if issubclass(kind, Stiction) and kind.law)
 
 
 def add_law(parser: Any) -> None:

@@ -137,7 +137,6 @@ class Stiction(Behaviour):
     # of a law with a moving state. The exact search refuses a law with None, the default search
     # takes it
     switching: ClassVar[Switching] = None
-    not_identified: ClassVar[str] = ""  # why it is not identified, one clause; empty when it is
     # keys of further parameters that stay at their defaults, which is said: constants of the law.
     # All others are identified
     held: ClassVar[tuple[str, ...]] = ()

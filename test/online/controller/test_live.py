@@ -9,13 +9,7 @@ import pytest
 
 from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlMode, StepStatus
-from stiction_ros.effects import (
-    ChoudhuryStiction,
-    FrictionLaw,
-    HeStiction,
-    KanoStiction,
-    SmoothedHeStiction,
-)
+from stiction_ros.effects import ChoudhuryStiction, FrictionLaw, HeStiction, KanoStiction, Stiction
 from stiction_ros.errors import InputError
 from stiction_ros.identification.friction import behaviour_of
 from stiction_ros.loop import LoopModel, Plant, SetPoints, ValveChange
@@ -661,9 +655,10 @@ def test_embedding_without_friction_says_so() -> None:
     assert live.step(np.array([50.0]), np.array([50.0])).reason == ""
 
 
-def test_a_law_without_a_jump_form_is_refused_as_a_value() -> None:
+def test_a_law_without_a_jump_form_is_refused_as_a_value(monkeypatch: pytest.MonkeyPatch) -> None:
     live = LiveController(SETTINGS, PROCESS)
-    other = PROCESS.with_valve_effects({"V1": [SmoothedHeStiction(7.0, 3.0)]})
+    monkeypatch.setattr(ChoudhuryStiction, "jump_form", Stiction.jump_form)
+    other = PROCESS.with_valve_effects({"V1": [ChoudhuryStiction(7.0, 3.0)]})
     assert "no jump form" in refusal_of(live, other)
 
 
