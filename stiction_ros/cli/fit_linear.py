@@ -9,7 +9,7 @@ from rich.table import Table
 
 from stiction_ros.cli.shared import intake_options as intake
 from stiction_ros.cli.shared import searches
-from stiction_ros.cli.shared.as_json import write_json
+from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.records.parts import longest_part
 
@@ -60,11 +60,8 @@ def run(options: argparse.Namespace) -> int:
     )
     with bar("fitting") as show:
         found = fit_linear(record, settings, progress=show)
-    if options.json is not None:
-        write_json(options.json, {"record": str(options.record)} | found.to_dict())
-    if options.json != "-":
-        print(f"{loop.name}: {loop.summary}")
-        _print(str(options.record), found)
+    told = {"record": str(options.record)} | found.to_dict()
+    hand_over(options.json, told, lambda: _print(f"{loop.name}: {loop.summary}", found))
     if found.status is LinearStatus.UNSTABLE:
         return 1
     if options.out is not None:
@@ -72,9 +69,11 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _print(name: str, found: "LinearIdentification") -> None:
+def _print(read: str, found: "LinearIdentification") -> None:
+    """Print what was ``read``, and what was found."""
+    print(read)
     console = Console()
-    title = f"{name}: state space, {found.samples} samples, {found.status}"
+    title = f"state space, {found.samples} samples, {found.status}"
     table = Table(title=title, title_justify="left")
     heads = ["output", "delay", "one step %", "free run %", "noise"]
     heads += [f"gain {valve}" for valve in found.valves]

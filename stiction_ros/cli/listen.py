@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.shared.as_json import write_json
+from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.cli.shared.node_processes import require_ros
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.errors import InputError
@@ -66,12 +66,10 @@ def run(options: argparse.Namespace) -> int:
         "cpu_seconds": time.process_time() - begin,
         "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
-    if options.json:
-        write_json(options.json, told)
     total = sum(window.samples for window in windows.values())
     missed = sum(window.missed for window in windows.values())
-    if options.json != "-":
-        print(f"{len(windows)} loops, {total} samples, {missed} missed")
+    said = f"{len(windows)} loops, {total} samples, {missed} missed"
+    hand_over(options.json, told, lambda: print(said))
     if not windows:
         print(
             "stiction: nobody publishes pv and op_applied; does the bridge run, in this "

@@ -18,13 +18,13 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared import intake_options as intake
-from stiction_ros.cli.shared.as_json import write_json
+from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.cli.shared.searches import add_law, delay_range
 from stiction_ros.errors import InputError, foreign, storing
 from stiction_ros.intake.sheets.cells import Numbers
 from stiction_ros.intake.tables.tags import list_rows
-from stiction_ros.texts import probability, spoken
+from stiction_ros.texts import spoken
 
 if TYPE_CHECKING:
     from stiction_ros.survey.entry import Entry
@@ -35,6 +35,10 @@ LOCAL = "local"  # the engine of this machine
 
 PAGE, CSV, XLSX = "survey.html", "survey.csv", "survey.xlsx"
 SHOWN = 30  # rows of the list that are printed
+COLUMNS = (
+    *("rank", "loop", "valve", "friction f_S", "OP lost", "probability", "cycles by"),
+    "|PV−SP| after service",
+)
 ALWAYS, CAUSE = 3, 6  # columns that are always there, and the first that is broken between words
 APART = 2  # blanks between two columns
 
@@ -61,45 +65,22 @@ def print_list(found: "Survey", earlier: "Sequence[Earlier]") -> None:
 
 
 def _table(entries: "Sequence[Entry]", width: int) -> Table:
-    """Return the columns that fit, the most telling first; no word of them is broken."""
-    from stiction_ros.survey.listing.headline import HEADS, in_words, kind_of
-    from stiction_ros.survey.pages.words import cause_words, op_figure, percent
+    """Return the columns of the page that fit, the most telling first; no word is broken."""
+    from stiction_ros.survey.listing.columns import columns_of
 
-    rows = [
-        (
-            str(entry.rank),
-            entry.name,
-            kind_of(entry),
-            op_figure(entry.f_s, entry.op_unit) if entry.found else "",
-            percent(entry.band_share) if entry.found else "",
-            probability(entry.probability),
-            cause_words(entry.cause),
-            in_words(entry, "service") if entry.gain else "",
-        )
-        for entry in entries
-    ]
-    heads = (
-        "rank",
-        "loop",
-        "valve",
-        "f_S",
-        "OP lost",
-        "probability",
-        "cycles by",
-        HEADS["service"],
-    )
+    known = {column.head: column for column in columns_of(entries, ())}
     table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
-    left, kept = width, list[int]()
-    for place, (head, *cells) in enumerate(zip(heads, *rows, strict=True)):
-        whole = place < CAUSE
+    left, kept = width, list[list[str]]()
+    for place, head in enumerate(head for head in COLUMNS if head in known):
+        cells, whole = [known[head].words(entry) for entry in entries], place < CAUSE
         words = [*head.split(), *(word for cell in cells for word in cell.split())]
         longest = max(map(len, [*head.split(), *cells] if whole else words))
         if any(cells) and (place < ALWAYS or left >= longest + APART):
             table.add_column(head, min_width=longest, no_wrap=whole, overflow="fold")
             left -= longest + APART
-            kept.append(place)
-    for row in rows:
-        table.add_row(*(row[place] for place in kept))
+            kept.append(cells)
+    for row in zip(*kept, strict=True):
+        table.add_row(*row)
     return table
 
 
@@ -200,10 +181,7 @@ def run(options: argparse.Namespace) -> int:
     intake.tell_strangers(options.tags, "export", strange_files(paths, reading))
     if plan.out is not None:
         _write(found, plan.out, earlier)
-    if options.json is not None:
-        write_json(options.json, found.to_dict())
-    if options.json != "-":
-        print_list(found, earlier)
+    hand_over(options.json, found.to_dict(), lambda: print_list(found, earlier))
     list_at = "no list and no page was written; --out DIR writes them"
     if plan.out is not None:
         list_at = f"list: {plan.out / PAGE}"

@@ -1,6 +1,7 @@
 """The columns of the list: heading, what it means, and the cells of a loop."""
 
 import functools
+import html
 import re
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -45,9 +46,13 @@ class Column(NamedTuple):
 
     def shown(self, entry: Entry) -> tuple[str, str]:
         """Return what the column shows of a loop, and what it is sorted by."""
-        html, value = self.cell(entry)
+        found, value = self.cell(entry)
         plain = "" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)
-        return html or self._dash(entry), plain
+        return found or self._dash(entry), plain
+
+    def words(self, entry: Entry) -> str:
+        """Return what the column tells of a loop in plain words; nothing where it is empty."""
+        return html.unescape(re.sub("<[^>]*>", "", self.cell(entry)[0]))
 
     def _dash(self, entry: Entry) -> str:
         """Return an empty cell, which says why it is empty."""
