@@ -79,24 +79,20 @@ figure { margin: 18px 0; } figcaption { margin-top: 4px; max-width: 90ch; }
 .square > svg { width: 100%; height: auto; }
 .plot > .over { overflow: visible; width: calc(100% - 92px); margin: 8px 24px 28px 68px; }
 .plot text { fill: var(--soft); font-size: 12px; } .square text { font-size: 9.5px; }
-.plot .mark { stroke: var(--ink); stroke-dasharray: 4 4; }
+.plot .mark { color: var(--ink); stroke-dasharray: 4 4; }
 .plot .frame { fill: none; stroke: var(--line); }
 .plot .grid { stroke: var(--line); stroke-width: 1; }
-.plot polyline { fill: none; stroke-width: 1.3; vector-effect: non-scaling-stroke; }
-.plot .pv { stroke: var(--pv); } .plot .op { stroke: var(--op); }
-.plot .stem { stroke: var(--stem); } .plot .sp { stroke: var(--sp); stroke-dasharray: 5 3; }
-.plot .free { stroke: var(--free); }
-.plot .ink { stroke: var(--ink); stroke-width: 4; opacity: .45; }
+.plot polyline { fill: none; stroke: currentColor; stroke-width: 1.3;
+  vector-effect: non-scaling-stroke; }
+.pv { color: var(--pv); } .op { color: var(--op); } .stem { color: var(--stem); }
+.sp { color: var(--sp); } .free { color: var(--free); } .ink { color: var(--ink); }
+.whole, .diagonal { color: var(--soft); }
+.plot .sp { stroke-dasharray: 5 3; } .plot .ink { stroke-width: 4; opacity: .45; }
 .plot .shade { fill: var(--soft); opacity: .14; }
-.plot .whole { stroke: var(--soft); stroke-width: .7; }
-.plot .diagonal { stroke: var(--soft); stroke-dasharray: 4 4; }
+.plot .whole { stroke-width: .7; } .plot .diagonal { stroke-dasharray: 4 4; }
 .key { display: flex; flex-wrap: wrap; gap: 3px 16px; font-size: .9rem; margin: 2px 0; }
 .key i { display: inline-block; width: 20px; border-top: 3px solid; margin: 0 6px 4px 0; }
-.key .pv { border-color: var(--pv); } .key .op { border-color: var(--op); }
-.key .stem { border-color: var(--stem); } .key .free { border-color: var(--free); }
-.key .sp { border-color: var(--sp); border-top-style: dashed; }
-.key .diagonal { border-color: var(--soft); border-top-style: dashed; }
-.key .whole { border-color: var(--soft); } .key .ink { border-color: var(--ink); }
+.key .sp, .key .diagonal { border-top-style: dashed; }
 .pair { display: grid; gap: 0 24px;
   grid-template-columns: repeat(auto-fit, minmax(min(280px, 100%), 460px)); }
 .zoom { display: flex; flex-wrap: wrap; gap: 6px; margin: 14px 0 -8px; }
