@@ -111,12 +111,6 @@ for (const figure of document.querySelectorAll("figure.plot[data-low]")) {
       show(view, Math.min(from, to), Math.max(from, to));
     from = null;
   });
-  svg.addEventListener("wheel", event => {
-    if (!event.ctrlKey) return;
-    event.preventDefault();
-    const middle = at(event), factor = event.deltaY > 0 ? 1.25 : 0.8;
-    show(view, middle - (middle - view.a) * factor, middle + (view.b - middle) * factor);
-  }, { passive: false });
 }
 """.replace("STEPS", str(CALENDAR))
 
