@@ -43,6 +43,15 @@ class FitWorker:
         """Whether the process has all the machine code that a fit needs."""
         return self._compiled.done()
 
+    def ready(self) -> bool:
+        """Wait until the process has all that a fit needs; tell whether it lives to have it."""
+        return self._compiled.exception() is None
+
+    def ended(self) -> int | None:
+        """Return how the process ended that has died; None where that cannot be told."""
+        self._pool.shutdown()
+        return next((process.exitcode for process in self._processes), None)
+
     def submit(self, work: Callable[..., T], *arguments: Any) -> Future[T]:
         """Queue a function of a module behind the fits; the future may hold what it raised."""
         try:
@@ -52,9 +61,9 @@ class FitWorker:
             self._start()
             return self._pool.submit(work, *arguments)
 
-    def close(self) -> None:
-        """Drop queued fits and end the process after the running one, if it is a fit."""
-        if not self._compiled.done():
+    def close(self, *, at_once: bool = False) -> None:
+        """Drop queued fits and end the process: after the running one, if it is a fit."""
+        if at_once or not self._compiled.done():
             for process in self._processes:
                 process.kill()
         self._pool.shutdown(wait=True, cancel_futures=True)

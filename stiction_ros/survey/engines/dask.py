@@ -3,22 +3,20 @@
 It runs whatever it is sent, so it belongs into a closed network, or behind TLS in Dask's settings.
 """
 
-import queue
-from collections.abc import Iterable, Iterator
 from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.survey.assess import Assessed, assess
-from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Task, lost
+from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Engine, Task, lost
 from stiction_ros.survey.entry import SurveyOptions
 
 SCHEME = "dask://"
 
-AHEAD = 3  # loops handed in for each thread of the cluster: one at work, others on their way
+AHEAD = 3  # loops handed over for each thread of the cluster
 PATIENCE = 15.0  # seconds within which a scheduler must answer
 
 
-class DaskEngine:
+class DaskEngine(Engine):
     """A scheduler and its workers."""
 
     def __init__(self, address: str) -> None:
@@ -50,6 +48,7 @@ class DaskEngine:
                 where="--engine",
                 fix="start it with dask scheduler, and workers with dask worker",
             ) from None
+        self.workers = self._threads()
         if not self.workers:
             self.close()
             raise InputError(
@@ -59,41 +58,27 @@ class DaskEngine:
             )
 
     @property
-    def workers(self) -> int:
-        """Threads of all workers that are there now."""
+    def room(self) -> int:
+        """One at work for each thread, others on their way."""
+        return AHEAD * max(self._threads(), 1)
+
+    def _threads(self) -> int:
         return sum(self._client.nthreads().values())
 
-    def run(self, tasks: Iterable[Task], options: SurveyOptions) -> Iterator[Done]:
-        """Yield what is said of each loop as it comes."""
-        waiting = iter(tasks)
-        given: dict[str, tuple[Task, Any]] = {}
-        coming: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    def submit(self, task: Task, options: SurveyOptions) -> Any:
+        """Hand over a loop, which the cluster tries again where a worker is lost."""
+        name = f"stiction-{task.key}-{self._client.id}"  # results of others are not ours
+        return self._client.submit(assess, task.loop, options, key=name, retries=ATTEMPTS)
 
-        def hand_in() -> None:
-            room = AHEAD * max(self.workers, 1) - len(given)
-            for _ in range(room):
-                task = next(waiting, None)
-                if task is None:
-                    return
-                name = f"stiction-{task.key}-{self._client.id}"  # results of others are not ours
-                future = self._client.submit(assess, task.loop, options, key=name, retries=ATTEMPTS)
-                given[future.key] = task, future
-                future.add_done_callback(coming.put)
-
-        hand_in()
-        while given:
-            future = coming.get()
-            task, _ = given.pop(future.key)
-            failure = future.exception()  # waits where an answer was lost: it is made once more
-            if failure is None and not future.cancelled():
-                answer = future.result()
-                assert isinstance(answer, Assessed)
-                yield Done(task, answer)
-            else:
-                reason = failure or future.status
-                yield lost(task, f"the cluster gave it up: {reason}", again=True)
-            future.release()
-            hand_in()
+    def outcome(self, task: Task, future: Any, attempt: int) -> Done:
+        """Return what the cluster says of a loop, or that it gave it up."""
+        failure = future.exception()  # waits where an answer was lost: it is made once more
+        if failure is not None or future.cancelled():
+            reason = failure or future.status
+            return lost(task, f"the cluster gave it up: {reason}", again=True)
+        answer = future.result()
+        assert isinstance(answer, Assessed)
+        return Done(task, answer)
 
     def close(self) -> None:
         """Leave the cluster; what was handed in and not taken out is dropped there."""

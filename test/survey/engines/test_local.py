@@ -2,6 +2,7 @@ import dataclasses
 import multiprocessing
 import os
 import time
+import types
 from typing import Any
 
 import pytest
@@ -96,7 +97,8 @@ def test_the_time_of_a_loop_begins_when_its_worker_is_ready() -> None:
 
 
 def test_where_no_worker_can_start_that_is_said_once() -> None:
-    broken = dataclasses.replace(OPTIONS, read_by=_Then(os._exit, 3))
+    method = types.SimpleNamespace(method=_Then(os._exit, 3))  # unpickled by the worker
+    broken = types.SimpleNamespace(identification=method)
     engine = LocalEngine(4)
     with pytest.raises(
         InputError, match="no worker process can start, the first ended with code 3"

@@ -1,11 +1,8 @@
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-
-from stiction_ros.survey.engines.local import same_imports
 
 HERE = Path(__file__).parent
 
@@ -44,13 +41,3 @@ def test_a_folder_of_the_name_of_the_package_is_not_taken_for_it(
     )
     assert done.stdout.strip() == "has no column OP", done.stderr[-2000:]
     assert done.stderr == ""
-
-
-def test_the_environment_is_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", "a")
-    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
-    with same_imports():
-        assert os.environ["PYTHONSAFEPATH"] == "1"
-        assert os.environ["PYTHONPATH"] == os.pathsep.join(p or os.getcwd() for p in sys.path)
-    assert os.environ["PYTHONPATH"] == "a"
-    assert "PYTHONSAFEPATH" not in os.environ
