@@ -26,7 +26,6 @@ _HEADLINES = {
     GapVerdict.NONE: "The simulation explains the records",
     GapVerdict.UNTESTABLE: "These records cannot show what the simulation lacks",
 }
-WINDOW = 400  # samples that are drawn, where an effect moves PV most
 
 
 def report_gap(found: Discrepancy, out: str | Path) -> Path:
@@ -43,7 +42,6 @@ def gap_page(found: Discrepancy) -> str:
         f'<p class="soft">{text(names)}: {len(found.runs)} samples of '
         f"{found.runs.sample_time:g} s; verdict {text(found.verdict)}</p>",
         '<div class="cards">' + "".join(effect_card(effect) for effect in found.effects) + "</div>",
-        *(effect_figure(found, effect) for effect in found.effects),
         *_decides(found),
         "<h2>The data</h2>" + _gate(found),
         "<h2>The gap</h2>" + _gaps(found),
@@ -229,40 +227,6 @@ def effect_card(effect: FoundEffect) -> str:
         say.word_of(effect.effect) + law,
         "\n".join(say.lines_of(effect)),
     )
-
-
-def effect_figure(found: Discrepancy, effect: FoundEffect) -> str:
-    """Return what an effect does to the output that it moves most; nothing where it moves none."""
-    if effect.moves is None or not float(np.ptp(effect.moves)) > 0.0:
-        return ""
-    base = levelled(found.base_after)
-    scored = np.column_stack([blocks.scored for blocks in base.blocks])
-    moves = np.where(scored, effect.moves, np.nan)
-    i = int(np.argmax(np.nanstd(moves, axis=0)))
-    rows, name = _liveliest(moves[:, i]), found.model_before.outputs[i]
-    pv = base.run.runs.pv[rows, i]
-    with_it = np.where(scored[rows, i], pv - base.noise[i].residual[rows], np.nan)
-    return over_time(
-        f"What it does: {say.called(effect.place, effect.effect)}, in the {rows.stop - rows.start} "
-        f"samples in which it moves {name} most. Both free runs are driven by the recorded OP "
-        "alone.",
-        np.arange(float(rows.start), rows.stop) * found.runs.sample_time,
-        [
-            Curve(f"{name}, measured", "whole", pv),
-            Curve("free run without it", "op", with_it - moves[rows, i]),
-            Curve("free run with it", "pv", with_it),
-        ],
-        text(name),
-    )
-
-
-def _liveliest(moves: np.ndarray[tuple[int], np.dtype[np.float64]]) -> slice:
-    """Return where a signal, NaN where it does not count, is farthest from its mean."""
-    count = min(WINDOW, len(moves))
-    squares = np.concatenate([[0.0], np.nancumsum((moves - np.nanmean(moves)) ** 2)])
-    inside = squares[count:] - squares[:-count]
-    first = int(np.argmax(inside))
-    return slice(first, first + count)
 
 
 def change_lines(found: Discrepancy) -> list[str]:

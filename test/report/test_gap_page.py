@@ -3,14 +3,13 @@
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from stiction_ros.config_files import find_config
 from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapOptions, find_discrepancy
 from stiction_ros.effects import HeStiction, from_mapping
 from stiction_ros.loop import LoopModel, SetPoints, simulate
-from stiction_ros.report.gap_page import WINDOW, _liveliest, report_gap
+from stiction_ros.report.gap_page import report_gap
 from stiction_ros.report.gap_words import figures_with_units
 
 
@@ -57,25 +56,14 @@ def test_a_figure_has_the_digits_that_its_interval_tells() -> None:
     assert "3.50 %, 95 % between 1 and 4" in dynamic
 
 
-def test_where_an_effect_moves_most_is_looked_for_where_samples_count() -> None:
-    moves = np.zeros(2000)
-    moves[:40], moves[900:960] = 1e3, 1.0
-    moves[:50] = np.nan
-    rows = _liveliest(moves)
-    assert rows.start <= 900
-    assert rows.stop >= 960
-    assert len(moves[rows]) == WINDOW
-
-
 def test_no_internal_words(said: str) -> None:
     for word in ("not_asked", "bias_step", "time_shift", "valve:V1", "process:PV1"):
         assert word not in said
 
 
-def test_it_shows_what_the_effect_does_and_what_would_decide(said: str, page: Path) -> None:
-    assert "What it does" in said
+def test_it_shows_what_would_decide(said: str, page: Path) -> None:
     assert "What would decide" in said
-    assert page.read_text(encoding="utf-8").count("<figure") > 4
+    assert page.read_text(encoding="utf-8").count("<figure") > 2
     assert [path.name for path in page.parent.iterdir()] == [page.name]
 
 
@@ -85,10 +73,3 @@ def test_an_effect_is_listed_once_in_each_look(page: Path) -> None:
         names = re.findall(r'<tr><td class="t">([^<]*)</td>', look.split("</table>")[0])
         assert len(names) > 5
         assert len(set(names)) == len(names)
-
-
-def test_moves_of_an_effect_are_what_it_adds(lagging: Discrepancy) -> None:
-    moves = lagging.effects[0].moves
-    assert moves is not None
-    assert moves.shape == lagging.runs.pv.shape
-    assert np.ptp(moves) > 0.0

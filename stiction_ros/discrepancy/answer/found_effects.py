@@ -4,18 +4,16 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.data.gate import DataFinding
 from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.uncertainty import Intervals
-from stiction_ros.discrepancy.gap.measure import Shrunk, gone_share, levelled, rms
+from stiction_ros.discrepancy.gap.measure import Shrunk, gone_share, rms
 from stiction_ros.discrepancy.gap.noise_effects import NoiseEffect
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.effects import Backlash, Behaviour, FloatArray, HeStiction
+from stiction_ros.effects import Backlash, Behaviour, HeStiction
 from stiction_ros.signals.autoregression import whiten
 
 
@@ -34,8 +32,6 @@ class FoundEffect:
     # places and effects that the record does not tell from it
     alternatives: tuple[tuple[str, str], ...] = ()
     sentence: str = ""  # why this effect was named, and not a rival
-    # what it adds to the free run, shape (N, p), units of PV; None for what no free run shows
-    moves: FloatArray | None = dataclasses.field(default=None, compare=False, repr=False)
 
     @property
     def effect(self) -> str:
@@ -139,12 +135,6 @@ def own_closed(without: Baseline, base: Baseline, *, dated: bool, given: bool) -
             left, less = (rms(each.innovations[every]) for each in (old, new))
             quick.append(Shrunk(left, less, noise.std, noise.std))
     return max(gone_share(closed), gone_share(quick))
-
-
-def moved_by(without: Baseline, base: Baseline) -> FloatArray:
-    """Return what an effect adds to the free run that is shown, shape (N, p)."""
-    pairs = zip(levelled(without).noise, levelled(base).noise, strict=True)
-    return np.column_stack([old.residual - new.residual for old, new in pairs])
 
 
 def without_its_jump(intervals: Intervals, effect: AddedEffect) -> Intervals:

@@ -7,7 +7,6 @@ import numpy as np
 
 from stiction_ros.discrepancy.answer.found_effects import (
     FoundEffect,
-    moved_by,
     of_data,
     of_noise,
     own_closed,
@@ -171,7 +170,6 @@ def _found(task: Task, state: State) -> list[FoundEffect]:
             verdict_of(effect.effect, effect.alternatives),
             effect.alternatives,
             reason_for(effect, state.looks),
-            moved_by(without[k], now.base),
         )
         found.append(told)
     return found
