@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from stiction_ros.checks import of_kind
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
+from stiction_ros.identification.problem.input_checks import refuse_swapped
 from stiction_ros.identification.result import Identification
 from stiction_ros.intake.intake import record_of
 from stiction_ros.one_thread import one_thread
@@ -68,7 +68,8 @@ def identify(
     chosen = IdentificationOptions() if options is None else options
     of_kind(chosen, IdentificationOptions, "options")
     with one_thread():
-        refuse_swapped(measured, swapped_columns(measured) if chosen.check_columns else None)
+        if chosen.check_columns:
+            refuse_swapped(measured)
         found = search_of(chosen.method)(measured, chosen, progress)
         from stiction_ros.identification.answer.advice import advised  # slow to import, now loaded
 

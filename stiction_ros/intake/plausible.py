@@ -13,7 +13,7 @@ from stiction_ros.intake.intake_options import TO_PERCENT, OpUnit, known_op_unit
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.tables.block import Block, Column
 from stiction_ros.intake.words import WORDS
-from stiction_ros.signals.tracking import explained, nearness
+from stiction_ros.signals.tracking import explained, is_nearer
 
 PERCENT = (-10.0, 110.0)  # what an OP in % stays within
 OFTEN = 0.1  # share of the samples outside of that from which it is told
@@ -137,8 +137,7 @@ def refuse_swapped(block: Block, *otherwise: str) -> None:
     Where a set-point is recorded, the measurement is what stays near it. Else:
     In closed loop a controller's output moves by K (Δe + T_s/T_i e): its Δ is explained by the
     measurement and its Δ at the same sample, and not the other way round. What rounding and
-    compression hide of that shows over some samples, see :data:`STRIDES`. Of exact controllers
-    :mod:`stiction_ros.identification.problem.input_checks` knows more.
+    compression hide of that shows over some samples, see :data:`STRIDES`.
     """
     op, pv, sp = (_only(block, signal) for signal in ("op", "pv", "sp"))
     if op is None or pv is None or (sp is None and block.of("sp")):
@@ -149,7 +148,7 @@ def refuse_swapped(block: Block, *otherwise: str) -> None:
         return
     output, measured, *rest = (values[there] for values in known)
     if sp is not None:
-        if np.ptp(measured) > 0.0 and nearness(rest[0], output, measured) is not None:
+        if is_nearer(rest[0], output, measured):
             said = f"{op[0]} stays near the set-point {sp[0]}, {pv[0]} does not"
             raise _swapped(block, said, otherwise)
         return

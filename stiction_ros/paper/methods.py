@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
+from stiction_ros.identification.problem.input_checks import refuse_swapped
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification
 from stiction_ros.records import Record
@@ -22,7 +22,7 @@ def identify(
     """
     begun = time.perf_counter()
     options = options or PaperOptions()
-    refuse_swapped(record, swapped_columns(record))
+    refuse_swapped(record)
     # Each is slow to import.
     from stiction_ros.paper.one_step_result import check_record, result
 

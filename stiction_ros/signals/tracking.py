@@ -9,20 +9,15 @@ OFFSET = 0.3  # lasting offset, as a share of the standard deviation of the erro
 TRACKED = 0.7  # error, as a share of the standard deviation of a moving SP
 
 
-def nearness(
-    sp: FloatArray, one: FloatArray, other: FloatArray, *, alone: bool = True
-) -> float | None:
-    """Return the distance of ``one`` from SP over that of ``other``, shape (N,) each.
+def is_nearer(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
+    """Return whether ``one`` tracks SP, and ``other``, which moves, is far from it; (N,) each.
 
-    None where it is not clearly nearer, does not track SP, or, if it must do so ``alone``, the
-    other one tracks it as well: of columns that both lie about SP, as those without their means
-    do, the nearer one may be so by its unit alone.
+    Of columns that both lie about SP, as those without their means do, the nearer one may be so by
+    its unit alone.
     """
     error, away = one - sp, other - sp
-    near, far = _size(error), _size(away)
-    if near <= CLOSER * far and _tracks(error, sp) and not (alone and _tracks(away, sp)):
-        return near / max(far, 1e-30)
-    return None
+    near = _size(error) <= CLOSER * _size(away) and bool(np.ptp(other) > 0.0)
+    return near and _tracks(error, sp) and not _tracks(away, sp)
 
 
 def _tracks(error: FloatArray, sp: FloatArray) -> bool:
