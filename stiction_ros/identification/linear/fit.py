@@ -1,9 +1,12 @@
 """A state-space model of a whole record: its delays, its order, remarks."""
 
 import dataclasses
+import functools
 import os
 import time
 from collections.abc import Callable
+
+import numpy as np
 
 from stiction_ros.checks import of_kind, one_of
 from stiction_ros.effects.behaviour import FloatArray
@@ -14,11 +17,12 @@ from stiction_ros.identification.linear.data import (
     OrderCriterion,
     prepare_linear,
 )
-from stiction_ros.identification.linear.delays import valve_delays
 from stiction_ros.identification.linear.result import LinearIdentification, in_engineering_units
 from stiction_ros.identification.linear.subspace import OrderChoice, choose_order
 from stiction_ros.intake.intake import record_of
 from stiction_ros.records.record import Record
+from stiction_ros.signals.arx_fit import ArxOrders, stable_arx
+from stiction_ros.signals.free_run import driven, fitted_free_run
 from stiction_ros.signals.subspace_projection import SubspaceMethod
 from stiction_ros.signals.tracking import explained
 
@@ -26,6 +30,11 @@ CONTROLLER_SHARE = 0.98
 CLOSED_LOOP = (
     "the record has set-points, so a controller was at work; the method predictor allows for it",
 )
+ORDER = 2  # n_a and n_b of the ARX equations whose free runs tell the delays
+MAX_RADIUS = 0.9995
+"""Largest root of A: the pole of an integrator that is fitted lies as near to 1 as this."""
+MARGIN = 2.0
+"""Of delays whose log likelihoods, times −2, differ by less, the longest is kept."""
 Progress = Callable[[float], None]
 
 
@@ -138,3 +147,41 @@ def _best(data: LinearData, options: LinearOptions, progress: Progress | None) -
         return choice.status is not LinearStatus.OK, choice.taken.value(options.criterion)
 
     return min(choices, key=rank)
+
+
+def valve_delays(data: LinearData, low: int, high: int) -> tuple[int, ...]:
+    """Return the delay of every valve, ``low`` to ``high`` samples, to the output that is first.
+
+    By ARX equations of second order whose free runs fit best.
+    """
+    rows = [_delays(data, output, low, high) for output in range(len(data.outputs))]
+    return tuple(int(delay) for delay in np.min(rows, axis=0))
+
+
+def _delays(data: LinearData, output: int, low: int, high: int) -> tuple[int, ...]:
+    """Return the delays to one output: one after the other is improved until none improves."""
+    y, orders = data.y[output], ArxOrders(ORDER, ORDER, ORDER + high)
+    target = y[orders.first :]
+
+    @functools.cache
+    def loss(delays: tuple[int, ...]) -> float:
+        fit = stable_arx(y, data.u, delays, orders, radius=MAX_RADIUS)
+        drive = driven(fit.b, delays, data.u, fit.constant)[orders.first :]
+        missed = float(np.mean((target - fitted_free_run(fit.a, drive, target)) ** 2))
+        return len(target) * float(np.log(max(missed, 1e-300)))
+
+    before, delays = None, (low,) * len(data.valves)
+    while delays != before:
+        before = delays
+        for j in range(len(delays)):
+            rivals = [(*delays[:j], d, *delays[j + 1 :]) for d in range(low, high + 1)]
+            delays = min(rivals, key=lambda rival: (loss(rival), rival))
+    # A leading b near zero counts as delay.
+    limit = loss(delays) + MARGIN
+    for j in range(len(delays)):
+        while delays[j] < high:
+            longer = (*delays[:j], delays[j] + 1, *delays[j + 1 :])
+            if loss(longer) > limit:
+                break
+            delays = longer
+    return delays

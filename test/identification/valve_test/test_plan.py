@@ -9,10 +9,15 @@ from hypothesis import strategies as st
 from manual_tests import answer, path
 
 from stiction_ros.identification.valve_test.facts import noise_over
-from stiction_ros.identification.valve_test.forecast import Forecast
 from stiction_ros.identification.valve_test.frictions import SMALLEST
 from stiction_ros.identification.valve_test.judgement import Judgement, judged
-from stiction_ros.identification.valve_test.plan import Facts, Plan, first_round, further_round
+from stiction_ros.identification.valve_test.plan import (
+    Facts,
+    Forecast,
+    Plan,
+    first_round,
+    further_round,
+)
 
 FACTS = Facts("V1", 50.0, 100.0, 0.8, 0.01, 3.0, 20.0, 10.0, (92.0, 108.0))
 

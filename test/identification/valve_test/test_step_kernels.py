@@ -4,8 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stiction_ros.identification.valve_test.likelihood import Shape
-from stiction_ros.identification.valve_test.step_kernels import white_rows
+from stiction_ros.identification.valve_test.likelihood import Shape, white_rows
 
 ROWS = 40
 
