@@ -45,36 +45,3 @@ def left_over(products: FloatArray, right: FloatArray, rest: float, out: FloatAr
         if not usable or used > rest * (1.0 + SAME):
             used = 0.0
         out[t] = max(rest - used, 1e-12 * rest)
-
-
-@compiled
-def delay_energy(products: FloatArray, right: FloatArray, rest: float) -> FloatArray:
-    """Return SE of stems at every delay, shape (G, T).
-
-    Args:
-        products: as :func:`.scan.step_products` returns them for one channel, shape
-            (G, 1, width, L).
-        right: shape (G, 1, L).
-        rest: sum of squares of what the columns leave of the output.
-    """
-    out = np.empty((len(products), products.shape[3] - products.shape[2] + 1))
-    for g in range(len(out)):
-        left_over(products[g, 0], right[g, 0], rest, out[g])
-    return out
-
-
-@compiled
-def pattern_energy(
-    products: FloatArray, right: FloatArray, level: float, rest: float, out: FloatArray
-) -> None:
-    """Write SE of one pattern base − level · sign at every delay, shape (T,).
-
-    Args:
-        products: of base with itself, base with sign, sign with itself, shape (3, width, L).
-        right: of base and sign with the rest, shape (2, L).
-        level: of the pattern.
-        rest: sum of squares of what the columns leave of the output.
-        out: the SE.
-    """
-    own = products[0] - level * products[1] + level * level * products[2]
-    left_over(own, right[0] - level * right[1], rest, out)

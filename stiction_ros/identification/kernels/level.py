@@ -4,7 +4,7 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.kernels.delay import pattern_energy
+from stiction_ros.identification.kernels.delay import left_over
 
 ZOOMS = 16
 POINTS = 5
@@ -18,14 +18,17 @@ def _loss(
     """Return the loss of one pattern over all outputs, and write its delays.
 
     Args:
-        products, rights: as :func:`pattern_energy`, one row per output.
+        products: by :func:`.scan.step_products` of base with itself, base with sign and sign with
+            itself, shape (p, 3, width, L).
+        rights: of base and sign with the rest, shape (p, 2, L).
         scales: rows (energy of the rest, number of samples, delays).
     """
     total = 0.0
     for p in range(len(products)):
         rest, count = scales[p, 0], scales[p, 1]
-        energy = np.empty(int(scales[p, 2]))
-        pattern_energy(products[p], rights[p], level, rest, energy)
+        energy, parts = np.empty(int(scales[p, 2])), products[p]
+        own = parts[0] - level * parts[1] + level * level * parts[2]
+        left_over(own, rights[p, 0] - level * rights[p, 1], rest, energy)
         best = int(energy.argmin())
         delays[p] = best
         total += count * np.log(energy[best] / count)
@@ -39,7 +42,7 @@ def best_levels(
     """Minimise over the level of every pattern inside its range.
 
     Args:
-        products, rights: as :func:`pattern_energy`, shape (G, p, …).
+        products, rights: as those of one pattern in :func:`_loss`, shape (G, p, …).
         scales: rows (energy of the rest, number of samples, delays) per output.
         ranges: of the level, shape (G, 2).
 

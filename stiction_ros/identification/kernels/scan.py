@@ -13,7 +13,7 @@ import numpy as np
 from stiction_ros.compiled import compiled, compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.kernels.copies import add_block, put
-from stiction_ros.identification.kernels.delay import DEPENDENT, delay_energy
+from stiction_ros.identification.kernels.delay import DEPENDENT, left_over
 
 STEMS = 64  # whose products are kept at a time
 
@@ -266,10 +266,12 @@ def least_energy(
     least, delays = np.empty(size), np.empty(size, dtype=np.int64)
     for begin in range(0, size, STEMS):
         part = offsets[begin : min(begin + STEMS, size) + 1]
-        energy = delay_energy(*step_products(window, part, places, values), rest)
-        for g in range(len(energy)):
-            delays[begin + g] = energy[g].argmin()
-            least[begin + g] = energy[g, delays[begin + g]]
+        products, right = step_products(window, part, places, values)
+        energy = np.empty(window.lags - window.width + 1)
+        for g in range(len(products)):
+            left_over(products[g, 0], right[g, 0], rest, energy)
+            delays[begin + g] = energy.argmin()
+            least[begin + g] = energy[delays[begin + g]]
     return least, delays
 
 

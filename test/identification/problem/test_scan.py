@@ -11,7 +11,8 @@ from scipy.signal import lfilter
 
 from stiction_ros.effects import FloatArray
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.identification.kernels.delay import delay_energy, pattern_energy
+from stiction_ros.identification.kernels.delay import left_over
+from stiction_ros.identification.kernels.level import best_levels
 from stiction_ros.identification.problem.models import Model, linear_model, refit
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import prepare, window
@@ -21,7 +22,11 @@ from stiction_ros.identification.switching import StepSignals
 
 def energy_of(scan: OutputScan, stems: StepSignals) -> FloatArray:
     """Return SE of each stem at each delay, shape (G, T)."""
-    return delay_energy(*scan.products(stems), scan.rest_energy)
+    products, rights = scan.products(stems)
+    energy = np.empty((stems.size, scan.delays))
+    for own, right, out in zip(products, rights, energy, strict=True):
+        left_over(own[0], right[0], scan.rest_energy, out)
+    return energy
 
 
 @given(seed=st.integers(0, 1000), na=st.integers(1, 3), nb=st.integers(1, 3))
@@ -44,7 +49,9 @@ def test_one_step_criterion_is_the_least_squares_one(seed: int, na: int, nb: int
 
 @settings(max_examples=15)
 @given(seed=st.integers(0, 1000), nb=st.integers(1, 3), p=st.integers(0, 2))
-def test_pattern_energy_is_that_of_the_stem_it_stands_for(seed: int, nb: int, p: int) -> None:
+def test_the_best_level_of_a_pattern_is_that_of_the_stem_it_stands_for(
+    seed: int, nb: int, p: int
+) -> None:
     generator = np.random.default_rng(seed)
     y = generator.standard_normal(150)
     other = generator.standard_normal((1, 150)).cumsum(axis=1)
@@ -54,12 +61,14 @@ def test_pattern_energy_is_that_of_the_stem_it_stands_for(seed: int, nb: int, p:
     a, d = np.array([1.0, -0.8]), np.array([1.0, 0.3, 0.1])[: p + 1]
     scan = OutputScan(y, other, (1,), Orders(1, nb, p, 20), (0, 3), d, a)
     products, rights = scan.products(StepSignals.of(bases, signs))
-    energy = np.empty((4, scan.delays))
+    scales = np.array([[scan.rest_energy, scan.count, scan.delays]])
     for f in range(3):
-        for g in range(4):
-            pattern_energy(products[g], rights[g], levels[g, f], scan.rest_energy, energy[g])
+        ranges = np.repeat(levels[:, f : f + 1], 2, axis=1)
+        _, _, loss, delays = best_levels(products[:, None], rights[:, None], scales, ranges)
         expected = energy_of(scan, StepSignals.of(bases - levels[:, f] * signs))
-        assert energy == pytest.approx(expected, rel=1e-7)
+        assert (delays[:, 0] == expected.argmin(axis=1)).all()
+        energy = scan.count * np.exp(loss / scan.count)
+        assert energy == pytest.approx(expected.min(axis=1), rel=1e-7)
 
 
 def test_stem_that_the_rest_explains_to_the_last_digit_explains_nothing() -> None:
