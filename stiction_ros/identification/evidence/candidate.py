@@ -6,9 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.evidence.fit_kernels import Given, losses_of
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.output_fit import OutputFit, fit_output
-from stiction_ros.identification.evidence.whitened import Criterion, Whitened
+from stiction_ros.identification.evidence.whitened import Whitened
 from stiction_ros.identification.kernels.scan import best_apart
 from stiction_ros.identification.linear.response_prior import FREE
 
@@ -42,8 +43,8 @@ class Judge:
 
     problem: Problem  # the record
     valve: int  # index
-    # criteria, one per output, of each way to do it; the best counts
-    ways: tuple[tuple[Criterion, ...], ...]
+    # what stands beside them in each output, of each way to do it; the best counts
+    ways: tuple[tuple[Given, ...], ...]
 
     @classmethod
     def of(
@@ -69,11 +70,11 @@ class Judge:
         ways = [[dataclasses.replace(fit.prior, reach=FREE) for fit in fits]]
         if held:
             ways.append([fit.prior for fit in fits])
-        criteria = (
+        given = (
             tuple(one.under(prior) for one, prior in zip(whitened, priors, strict=True))
             for priors in ways
         )
-        return cls(problem, valve, tuple(criteria))
+        return cls(problem, valve, tuple(given))
 
     def losses(self, rows: FloatArray) -> FloatArray:
         """Return the loss of many frictions, shape (G,).
@@ -90,7 +91,7 @@ class Judge:
             some = within[begin : begin + TOGETHER]
             stems = problem.stems(valve, rows[some, :-1], rows[some, -1])
             found = np.array(
-                [[one.losses(stems, problem.least_moves) for one in way] for way in self.ways]
+                [[losses_of(stems, one, problem.least_moves) for one in way] for way in self.ways]
             )
             out[some] = found.sum(axis=1).min(axis=0)
         return out

@@ -179,24 +179,20 @@ class Given(NamedTuple):
     pull: FloatArray  # that a held response adds to its products with the target, shape (r,)
     energy: float  # of that and of the prior of what explains the rest
     edges: IntArray  # of the groups of lags, shape (r + 1,)
+    precision: FloatArray  # inverse of K, shape (r, r)
+    constant: float  # log det K, and what all these add to the loss
 
 
 @compiled_fused
-def _evidence(stem: FloatArray, moves: Moves, given: Given, precision: FloatArray) -> float:
+def _evidence(stem: FloatArray, moves: Moves, given: Given) -> float:
     r"""Return −2 log of the marginal likelihood but for constants.
 
     .. math:: n \log(r / n) + \log\det(X X^T + K^{-1})
 
     with r what the response of the best fit and its prior leave of the target, and X the whitened
-    lags of the stem but for what stands beside them explains. log det K is the caller's.
-
-    Args:
-        stem: scaled, shape (N,).
-        moves: of the stem.
-        given: everything else.
-        precision: inverse of K, shape (r, r).
+    lags of the stem, scaled, shape (N,), but for what stands beside them explains.
     """
-    size, known, edges = len(precision), len(given.lines.rows), given.edges
+    size, known, edges = len(given.precision), len(given.lines.rows), given.edges
     taps, count = edges[-1], given.judged
     signal = with_past(whitened(given.noise, stem, stem[0]), taps)[-(taps + count + 1) :]
     first = step_products(given.noise, signal[-1 - count : -1], len(stem), taps)
@@ -213,7 +209,7 @@ def _evidence(stem: FloatArray, moves: Moves, given: Given, precision: FloatArra
         put_block(shared[:, at : at + size], lagged_products(signal, beside, begun, edges))
     shared = np.dot(shared, given.root.T)
     gram -= np.dot(shared, shared.T)
-    gram += precision
+    gram += given.precision
     determinant = factorised(gram)
     seen = grouped(lag_products(moves, given.target, taps), edges) + given.pull
     left = max(given.energy - explained_by(gram, seen), LEAST * given.energy)
@@ -221,13 +217,11 @@ def _evidence(stem: FloatArray, moves: Moves, given: Given, precision: FloatArra
 
 
 @compiled_fused
-def evidences(
-    stems: FloatArray, given: Given, precision: FloatArray, least_moves: int
-) -> FloatArray:
-    """Return the evidence of many stems, shape (G, N); infinite where one moves less often."""
+def losses_of(stems: FloatArray, given: Given, least_moves: int) -> FloatArray:
+    """Return the loss of many stems, shape (G, N); infinite where one moves in fewer rows."""
     out = np.full(len(stems), np.inf)
     for g in range(len(stems)):
         moves = moves_of(stems[g])
         if len(moves.at) >= least_moves:
-            out[g] = _evidence(stems[g], moves, given, precision)
+            out[g] = _evidence(stems[g], moves, given) + given.constant
     return out

@@ -15,7 +15,6 @@ from stiction_ros.identification.evidence.fit_kernels import (
     Lines,
     beside_lines,
     beside_prior,
-    evidences,
     evidences_of,
     factorised,
     solved,
@@ -37,23 +36,6 @@ ComplexArray = NDArray[np.complex128]
 def energy_of(signal: FloatArray) -> float:
     """Return the sum of squares."""
     return float(signal @ signal)
-
-
-@dataclasses.dataclass(frozen=True)
-class Criterion:
-    """The loss of one output as a function of the stem of one valve, all else given."""
-
-    given: Given  # what stands beside the stem
-    precision: FloatArray  # inverse of K
-    constant: float  # what the loss adds to the kernel's
-
-    def losses(self, stems: FloatArray, least_moves: int = 0) -> FloatArray:
-        """Return the loss of each of many stems, scaled, shape (G, N).
-
-        It is infinite for a stem that moves in fewer than ``least_moves`` rows.
-        """
-        found = evidences(stems, self.given, self.precision, least_moves)
-        return np.asarray(found + self.constant)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -207,8 +189,8 @@ class Whitened:
         out[: len(self.noise)] += self.noise
         return out
 
-    def under(self, prior: ResponsePrior) -> Criterion:
-        """Return the criterion for one more stem beside these, their responses integrated out."""
+    def under(self, prior: ResponsePrior) -> Given:
+        """Return what judges one more stem beside these, their responses integrated out."""
         equations, seen, energy = self.equations(prior)
         factor = np.linalg.cholesky(equations)
         root = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
@@ -226,20 +208,18 @@ class Whitened:
         determinant = 2.0 * float(np.log(np.diag(factor)).sum()) + self.log_determinant(prior)
         rows, taps = self.stems.shape[1], int(self.edges[-1])
         noise, count = self.noise, len(self.seen)
-        return Criterion(
-            Given(
-                noise=noise,
-                judged=count,
-                lines=self.known,
-                others=self.stems,
-                beside=self.lags.past,
-                others_first=self.lags.first,
-                root=np.ascontiguousarray(root),
-                target=step_products(noise, target, rows, taps),
-                pull=pull,
-                energy=energy,
-                edges=self.edges,
-            ),
-            precision,
-            determinant + prior.log_determinant(self.edges),
+        return Given(
+            noise=noise,
+            judged=count,
+            lines=self.known,
+            others=self.stems,
+            beside=self.lags.past,
+            others_first=self.lags.first,
+            root=np.ascontiguousarray(root),
+            target=step_products(noise, target, rows, taps),
+            pull=pull,
+            energy=energy,
+            edges=self.edges,
+            precision=precision,
+            constant=determinant + prior.log_determinant(self.edges),
         )
