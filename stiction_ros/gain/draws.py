@@ -8,7 +8,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.result import ValveEstimate, VerdictKind
 from stiction_ros.loop.repeated_loops import Equations
-from stiction_ros.signals.recovered_controller import RecoveredController
+from stiction_ros.signals.controller_recovery import RecoveredController
 
 DRAWS = 20
 """Loops drawn, the estimate itself among them."""

@@ -54,9 +54,9 @@ from stiction_ros.loop.repeated_loops import (
     run_again,
 )
 from stiction_ros.records.record import Record
+from stiction_ros.signals.controller_recovery import RecoveredController
 from stiction_ros.signals.holds import holds
 from stiction_ros.signals.oscillation import NEEDED_CYCLES
-from stiction_ros.signals.recovered_controller import RecoveredController
 
 MOST = 4000
 """Samples that are run again, the last ones: hundreds of cycles say no more."""

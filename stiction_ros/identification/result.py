@@ -11,7 +11,7 @@ from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.identification.friction import behaviour_of, find_law, first_values
 from stiction_ros.identification.judgement import Figures, VerdictKind
 from stiction_ros.processes import ArxOutput, Noise
-from stiction_ros.signals.free_run import driven, fitted_free_run
+from stiction_ros.signals.arx import driven, fitted_free_run
 
 Interval = tuple[float, float]
 __all__ = ["FitStatus", "Identification", "OrderRow", "OutputModel", "ValveEstimate", "VerdictKind"]

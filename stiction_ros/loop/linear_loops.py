@@ -12,7 +12,7 @@ import numpy as np
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.effects.grid_kernels import slope_step
-from stiction_ros.signals.recovered_controller import RecoveredController
+from stiction_ros.signals.controller_recovery import RecoveredController
 
 Pairs = Sequence[tuple[int, RecoveredController]]
 """Per valve the output of its controller, −1 for none, and the controller."""

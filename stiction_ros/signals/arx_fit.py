@@ -15,8 +15,7 @@ from scipy.linalg import lstsq
 
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.signals.arx import arx_columns
-from stiction_ros.signals.free_run import driven
+from stiction_ros.signals.arx import arx_columns, driven
 from stiction_ros.signals.polynomials import largest_root, recursion, stabilised
 
 RANK_TOLERANCE = 1e-12

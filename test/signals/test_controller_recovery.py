@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from known_loops import Kind, known
 
 from stiction_ros.records.record import Record
-from stiction_ros.signals.controller_recovery import recover
-from stiction_ros.signals.recovered_controller import ControllerStatus, RecoveredController
+from stiction_ros.signals.controller_recovery import ControllerStatus, RecoveredController, recover
 
 STICKY = Kind(friction=(3.0, 1.0), noise=0.05)
 

@@ -19,7 +19,7 @@ from stiction_ros.identification.result import FitStatus, Identification, Output
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import Noise
 from stiction_ros.records.record import Record
-from stiction_ros.signals.recovered_controller import RecoveredController
+from stiction_ros.signals.controller_recovery import RecoveredController
 
 FIGURES = 10
 """Digits that are written: enough for the poles of any process."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.result import OutputModel
-from stiction_ros.signals.free_run import step_response
+from stiction_ros.signals.arx import step_response
 
 RISEN = 0.632  # share of the whole answer that a first-order process has given after one lag
 # times by which an answer that does not settle grows from a quarter of the record to its half: 2

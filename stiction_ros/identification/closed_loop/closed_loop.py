@@ -16,11 +16,10 @@ from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, scal
 from stiction_ros.identification.result import FitStatus, Identification, ValveEstimate
 from stiction_ros.loop.linear_loops import Process, Ringing, ringing
 from stiction_ros.records.record import Record
-from stiction_ros.signals.controller_recovery import recover
+from stiction_ros.signals.controller_recovery import ControllerStatus, RecoveredController, recover
 from stiction_ros.signals.holds import holds
 from stiction_ros.signals.oscillation import Oscillation, amplitude, oscillation
 from stiction_ros.signals.outside_line import NO_LINE, OutsideLine, Predicted, beside, outside_line
-from stiction_ros.signals.recovered_controller import ControllerStatus, RecoveredController
 
 UNSEEN_CYCLES = 10  # cycles that a record without an oscillation is taken to have room for
 SPAN_SHARE = 3.0  # spans of the controller's fit go up to the period over this

@@ -12,7 +12,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.result import OutputModel
 from stiction_ros.loop.linear_loops import Pairs, Process
 from stiction_ros.records.record import Record
-from stiction_ros.signals.free_run import driven
+from stiction_ros.signals.arx import driven
 from stiction_ros.signals.polynomials import recursion
 
 # decimals that are kept of scaled numbers: a valve that slips a sample later for the last bits of a

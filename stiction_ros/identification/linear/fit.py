@@ -21,8 +21,8 @@ from stiction_ros.identification.linear.result import LinearIdentification, in_e
 from stiction_ros.identification.linear.subspace import OrderChoice, choose_order
 from stiction_ros.intake.intake import record_of
 from stiction_ros.records.record import Record
+from stiction_ros.signals.arx import driven, fitted_free_run
 from stiction_ros.signals.arx_fit import ArxOrders, stable_arx
-from stiction_ros.signals.free_run import driven, fitted_free_run
 from stiction_ros.signals.subspace_projection import SubspaceMethod
 from stiction_ros.signals.tracking import explained
 

@@ -16,7 +16,7 @@ from stiction_ros.pages.plot import Curve, over_time
 from stiction_ros.pages.signals import Units
 from stiction_ros.records.record import Record
 from stiction_ros.report.page import Cell, card, interval, number, percent, table
-from stiction_ros.signals.free_run import step_response as answer_to_step
+from stiction_ros.signals.arx import step_response as answer_to_step
 from stiction_ros.signals.polynomials import largest_root
 from stiction_ros.texts import probability, spoken, symbol
 

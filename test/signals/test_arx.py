@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stiction_ros.signals.arx import arx_columns
-from stiction_ros.signals.free_run import driven, fitted_free_run, step_response
+from stiction_ros.signals.arx import arx_columns, driven, fitted_free_run, step_response
 from stiction_ros.signals.polynomials import largest_root, recursion
 from stiction_ros.signals.state_space import responses
 
