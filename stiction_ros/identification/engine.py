@@ -118,7 +118,6 @@ def judged_valves(
             stem_start=float(record.op[0, j] + model.start[j]),
             moves=int(np.count_nonzero(np.diff(model.stems[j]))),
             evidence=figures,
-            profile=intervals.profile,
             stability=Stability(halves(gains, BELIEVED if healthy else None)),
         )
         valves.append(valve)

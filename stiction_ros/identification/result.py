@@ -136,8 +136,6 @@ class ValveEstimate:
     moves: int  # number of samples at which the estimated stem moved
     # named figures behind the verdict, see ``stiction_ros.identification.conclusion``
     evidence: Mapping[str, float]
-    # rows (f_S, least −2 log likelihood above the best) over the patterns that were tried, f_S in %
-    profile: tuple[tuple[float, float], ...] = ()
     band_share: float = 0.0  # f_S + f_D over the width of OP's movement about its slow mean
     # how the answer holds at other rates and in halves; None where a method does not look
     stability: Stability | None = None
@@ -370,9 +368,6 @@ class Identification:
         }
         if self.orders:
             model["orders"] = [dataclasses.asdict(row) for row in self.orders]
-        profiles = {v.name: [list(row) for row in v.profile] for v in self.valves if v.profile}
-        if profiles:
-            model["profiles"] = profiles
         return {
             "samples": self.samples,
             "sample_time": self.sample_time,

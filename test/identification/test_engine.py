@@ -151,16 +151,6 @@ def test_orders_that_were_compared_are_listed() -> None:
     assert len(found.outputs[0].a) == best.output_order
 
 
-def test_profile_is_lowest_at_the_estimate() -> None:
-    valve = identify(loops.example1(0), THIRD_ORDER).valves[0]
-    excess = dict(valve.profile)
-    lowest = min(excess, key=lambda f_s: excess[f_s])
-    assert excess[lowest] == pytest.approx(0.0, abs=1e-9)
-    low, high = valve.static_interval
-    assert low <= lowest <= high
-    assert all(value > 7.8 for f_s, value in excess.items() if not low <= f_s <= high)
-
-
 def test_delays_that_cannot_be_told_apart_are_named() -> None:
     notes = identify(loops.example1(1, samples=1200), THIRD_ORDER).notes
     assert any("delays 4, 5 of V1 to PV1" in note for note in notes)

@@ -41,15 +41,13 @@ class Accepted:
     # what the best friction adds whose band is above ``HARMLESS``; below 0 where all such are less
     # likely than none
     material_gain: float
-    profile: tuple[tuple[float, float], ...]  # rows (f_S, least loss above the best), best over f_D
 
     def times(self, span: float) -> "Accepted":
         """Return the same with frictions in % of a valve whose OP has this span, %."""
         static, dynamic, band = (
             (span * low, span * high) for low, high in (self.static, self.dynamic, self.band)
         )
-        profile = tuple((span * friction, loss) for friction, loss in self.profile)
-        return dataclasses.replace(self, static=static, dynamic=dynamic, band=band, profile=profile)
+        return dataclasses.replace(self, static=static, dynamic=dynamic, band=band)
 
 
 def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> Accepted:
@@ -81,7 +79,6 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
         gain=gain,
         deadband_loss=float(lost[flat].min(initial=np.inf)),
         material_gain=found.without[valve].loss - material,
-        profile=_profile(rows[:, 0], lost),
     )
 
 
@@ -118,19 +115,6 @@ def _beyond(inside: FloatArray) -> FloatArray:
         grid = np.vstack([alike, same_jump])
         out.append(np.column_stack([grid, np.full(len(grid), end[2])]))
     return np.vstack(out)
-
-
-def _profile(static: FloatArray, lost: FloatArray) -> tuple[tuple[float, float], ...]:
-    """Return the lower envelope of the loss over f_S."""
-    order = np.argsort(static, kind="stable")
-    static, lost = static[order], lost[order]
-    edges = np.flatnonzero(np.diff(static, prepend=-1.0) > 1e-9)
-    least = np.minimum.reduceat(lost, edges)
-    return tuple(
-        (float(f), float(loss))
-        for f, loss in zip(static[edges], least, strict=True)
-        if np.isfinite(loss)
-    )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -172,7 +172,6 @@ def _estimate(
         stem_start=float(record.op[0, valve]) + span * float(chosen.starts[valve]),
         moves=int(np.count_nonzero(np.diff(chosen.stems[valve]))),
         evidence={},
-        profile=held.profile,
     )
     return with_further(estimate, problem, found, valve, options.confidence)
 

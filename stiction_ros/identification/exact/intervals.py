@@ -38,8 +38,6 @@ class FrictionIntervals:
     patterns: int
     closed: bool  # whether that enumeration reached rejected patterns on every side
     model: Model  # the model with the best pattern
-    # rows (f_S, least loss above the best) over all patterns tried, %
-    profile: tuple[tuple[float, float], ...]
 
 
 def friction_intervals(
@@ -71,7 +69,6 @@ def friction_intervals(
         patterns=0 if near is None else near.patterns,
         closed=near is not None and near.closed,
         model=model,
-        profile=_profile(scan, floor, limit),
     )
 
 
@@ -113,22 +110,6 @@ def _without_standstill(
     else:
         loss[still] = np.maximum(loss[still], loss[~still].min())
     return dataclasses.replace(scan, loss=loss)
-
-
-def _profile(scan: PatternScan, floor: float, limit: float) -> tuple[tuple[float, float], ...]:
-    """Return the lower envelope of the loss over f_S, finest where it is lowest."""
-    static = np.array([scan.middle(index, limit)[0] for index in range(len(scan.loss))])
-    best = static[int(scan.loss.argmin())]
-    step = limit * np.array([0.0, *np.geomspace(1e-4, 1.0, 25)])
-    edges = np.unique(np.concatenate([best - step, best + step]))
-    bins = np.searchsorted(edges, static)
-    rows = []
-    for number in np.unique(bins):
-        inside = np.flatnonzero((bins == number) & np.isfinite(scan.loss))
-        if len(inside):
-            lowest = inside[int(scan.loss[inside].argmin())]
-            rows.append((float(static[lowest]), float(scan.loss[lowest] - floor)))
-    return tuple(rows)
 
 
 def _estimate(

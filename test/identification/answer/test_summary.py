@@ -34,7 +34,6 @@ def answer(verdict: VerdictKind = VerdictKind.STICKY, valves: int = 1) -> Identi
         stem_start=50.0,
         moves=40,
         evidence={f"figure_{k}": float(k) for k in range(50)},
-        profile=tuple((float(k), 1.0) for k in range(500)),
         band_share=1.02,
         experiment="Too little moved. Step OP by 5 % twice.",
     )

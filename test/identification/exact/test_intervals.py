@@ -65,15 +65,5 @@ def test_only_a_jump_rejects_the_deadband(
     assert 0.0 <= levels["deadband"][0.99].deadband_loss < 4.0
 
 
-@pytest.mark.parametrize("name", TRUTHS)
-def test_the_profile_is_least_inside_the_interval(
-    levels: dict[str, dict[float, FrictionIntervals]], name: str
-) -> None:
-    wide = levels[name][0.99]
-    least = min(wide.profile, key=lambda row: row[1])
-    assert least[1] == pytest.approx(0.0, abs=1e-6)
-    assert wide.static[0] <= least[0] <= wide.static[1]
-
-
 def holds(outer: Interval, inner: Interval) -> bool:
     return outer[0] <= inner[0] + 1e-9 and inner[1] <= outer[1] + 1e-9
