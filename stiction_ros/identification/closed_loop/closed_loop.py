@@ -43,10 +43,7 @@ class ValveLoop:
     # alone
     driven: float = 0.0
     band_share: float = 0.0  # f_S + f_D over the width of OP's movement about its slow mean
-    # moved_with, moved_without: movement of OP over the recorded one when the record is repeated
-    # with its noise, with the friction and without; see ``Moved``
-    moved_with: float = 0.0
-    moved_without: float = 0.0
+    moved_with: float = 0.0  # movement of OP when the record is repeated, see ``Moved``
     # share of the movement of OP, or of PV − SP, that goes away with the friction
     gone: float = 0.0
     before: OutsideLine = NO_LINE  # a line from outside in OP, beside what comes from PV
@@ -227,7 +224,6 @@ def _valve(
         repeated.driven(j),
         share,
         moved.with_friction,
-        moved.without_friction,
         moved.gone,
         outside_line(Predicted(loop.op[rows, j], [error], [0]), at),
         outputs[i].after,

@@ -8,7 +8,6 @@ from stiction_ros.loop.linear_loops import Ringing
 from stiction_ros.records.record import Record
 from stiction_ros.signals.oscillation import REGULAR
 
-ENDLESS = 1e6  # stands in the figures for a movement that grows without end
 # share of OP's movement that must go away with the friction for the valve to be the cause
 MATERIAL = 0.15
 # the same of a friction that was not found, where nothing else explains the oscillation
@@ -55,7 +54,7 @@ def explained(record: Record, found: Identification, closed: ClosedLoop) -> Iden
             band_share=loop.band_share,
             evidence=valve.evidence
             if valve.figures is not None
-            else {**valve.evidence, **figures(loop, closed)},
+            else {**valve.evidence, **figures(loop)},
         )
         for valve, loop in zip(found.valves, closed.valves, strict=True)
     )
@@ -66,29 +65,16 @@ def explained(record: Record, found: Identification, closed: ClosedLoop) -> Iden
     return dataclasses.replace(found, valves=valves, outputs=outputs)
 
 
-def figures(loop: ValveLoop, closed: ClosedLoop) -> dict[str, float]:
+def figures(loop: ValveLoop) -> dict[str, float]:
     """Return the figures of one closed loop, by name; none where it could not be closed.
 
-    ``moved_with``, ``moved_without``: movement of OP over the recorded one when the record is
-    repeated with its noise. ``loop_gone``: share of that movement that goes away.
-    ``controller_fit``: R². ``outside_line``: BIC gain by a line that enters behind the valve;
-    ``line_rivalry``: that of a line alone over that of the friction.
+    ``controller_fit``: R². ``outside_line``: BIC gain by a line that enters behind the valve.
+    ``loop_gone``: share of the movement that goes away without the friction.
     """
     if loop.controller is None:
         return {}
-    told = {
-        "controller_fit": loop.controller.r_squared,
-        "moved_without": loop.moved_without,
-        "outside_line": loop.outside.gain,
-    }
-    if loop.band_share > 0.0:
-        output = next(one for one in closed.outputs if one.name == loop.output)
-        told |= {
-            "line_rivalry": output.rivalry,
-            "moved_with": loop.moved_with,
-            "loop_gone": loop.gone,
-        }
-    return {name: max(-ENDLESS, min(value, ENDLESS)) for name, value in told.items()}
+    told = {"controller_fit": loop.controller.r_squared, "outside_line": loop.outside.gain}
+    return told | ({"loop_gone": loop.gone} if loop.band_share > 0.0 else {})
 
 
 def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> Cause:

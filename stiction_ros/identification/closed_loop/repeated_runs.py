@@ -36,8 +36,7 @@ def law_of(valve: ValveEstimate) -> tuple[float, float, float]:
 class Moved:
     """How a loop moves when its record is repeated, between moves of its set-point."""
 
-    with_friction: float  # with_friction, without_friction: movement of OP over the recorded one
-    without_friction: float
+    with_friction: float  # movement of OP over the recorded one
     # share that goes away with the friction, of OP's movement or of that of PV − SP, whichever is
     # more: a controller that passes noise on to the valve moves OP anyway, and one that is slow
     # hardly moves it at all
@@ -168,10 +167,8 @@ class Repeated:
         middle = [
             (np.sort(of[:number])[number // 2], np.sort(of[number:])[NOISES // 2]) for of in sizes
         ]
-        recorded = self.recorded(valve, period)
         return Moved(
-            float(middle[0][0]) / recorded,
-            float(middle[0][1]) / recorded,
+            float(middle[0][0]) / self.recorded(valve, period),
             max(gone(float(stuck), float(free)) for stuck, free in middle),
         )
 
