@@ -40,11 +40,19 @@ class SustainedOscillation:
     """
 
     valve: str  # tag
-    span: float  # Δu, %
-    sustained: bool  # whether another part repeats it; False where the span of OP stands in
     whole: float  # span of OP over the record, %
-    parts: tuple[tuple[int, int], ...]  # first row and one past the last of every part looked at
     spans: tuple[float, ...]  # of OP in each part, %
+
+    @property
+    def repeated(self) -> float | None:
+        """The largest span that another part reaches by half, %; None for none."""
+        pairs = itertools.pairwise(sorted(self.spans, reverse=True))
+        return next((large for large, small in pairs if small >= REPEATED * large > 0.0), None)
+
+    @property
+    def span(self) -> float:
+        """Δu, %; the span of OP over the record where no part repeats another."""
+        return self.whole if self.repeated is None else self.repeated
 
     @property
     def alike(self) -> int:
@@ -53,7 +61,7 @@ class SustainedOscillation:
 
     def __str__(self) -> str:
         """Return the evidence in one line."""
-        if not self.sustained:
+        if self.repeated is None:
             return f"Δu of {self.valve} {self.span:.3g} %: no oscillation repeats, OP's whole span"
         return (
             f"Δu of {self.valve} {self.span:.3g} %, within a tenth in {self.alike} of "
@@ -63,32 +71,17 @@ class SustainedOscillation:
 
 def sustained_oscillations(record: Record) -> tuple[SustainedOscillation, ...]:
     """Return Δu of every valve of a record, with its evidence."""
-    parts = _parts(record)
-    return tuple(
-        _of_valve(tag, op, parts) for tag, op in zip(record.valves, record.op.T, strict=True)
-    )
-
-
-def _parts(record: Record) -> tuple[tuple[int, int], ...]:
-    """Return the settled half of every hold, or equal parts where no set-point moves."""
     rows = [] if record.sp is None else holds(record.sp)
-    if len(rows) < 2:
+    if len(rows) < 2:  # equal parts where no set-point moves, else the settled half of every hold
         edges = np.linspace(0, len(record), PARTS + 1).astype(int).tolist()
         rows = list(itertools.pairwise(edges))
     else:
         rows = [(begin + int(SETTLED * (end - begin)), end) for begin, end in rows]
-    return tuple((begin, end) for begin, end in rows if end - begin >= MIN_PART)
-
-
-def _of_valve(tag: str, op: FloatArray, parts: tuple[tuple[int, int], ...]) -> SustainedOscillation:
-    spans = tuple(float(np.ptp(op[begin:end])) for begin, end in parts)
-    ordered = sorted(spans, reverse=True)
-    repeated = [
-        large for large, small in itertools.pairwise(ordered) if small >= REPEATED * large > 0.0
-    ]
-    whole = float(np.ptp(op))
-    span = repeated[0] if repeated else whole
-    return SustainedOscillation(tag, span, bool(repeated), whole, parts, spans)
+    parts = [slice(begin, end) for begin, end in rows if end - begin >= MIN_PART]
+    return tuple(
+        SustainedOscillation(tag, float(np.ptp(op)), tuple(float(np.ptp(op[p])) for p in parts))
+        for tag, op in zip(record.valves, record.op.T, strict=True)
+    )
 
 
 @dataclasses.dataclass(frozen=True)

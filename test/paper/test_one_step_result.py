@@ -151,7 +151,7 @@ def test_throws_at_set_point_moves_do_not_count(
     op = op + drift * (time // 200) + throw * cycle * (time % 200 < 15)
     sp = (time // 200).astype(float)[:, None]
     (found,) = sustained_oscillations(made(op, sp))
-    assert found.sustained
+    assert found.repeated is not None
     assert found.span == pytest.approx(cycle)
     assert found.alike == 4
     assert found.whole >= throw * cycle
@@ -163,7 +163,7 @@ def test_a_cycle_that_is_seen_in_one_hold_only_is_not_sustained() -> None:
     op[0] = 20.0
     sp = (np.arange(800) // 200).astype(float)[:, None]
     (found,) = sustained_oscillations(made(op, sp))
-    assert not found.sustained
+    assert found.repeated is None
     assert found.span == found.whole == pytest.approx(np.ptp(op))
 
 
@@ -171,7 +171,7 @@ def test_without_a_set_point_the_record_is_cut_into_parts() -> None:
     op = 2.0 * np.sin(2.0 * np.pi * np.arange(800) / 25.0)
     op[10] = 30.0
     (found,) = sustained_oscillations(made(op, None))
-    assert len(found.parts) == 8
+    assert len(found.spans) == 8
     assert found.span == pytest.approx(4.0, rel=0.02)
 
 

@@ -19,9 +19,10 @@ import casadi as ca
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.paper.one_step_result import EquationError, fit_outputs
 from stiction_ros.paper.programme.programme_data import Frame, ProgrammeData
 from stiction_ros.paper.programme.reduced_programme import ALPHA, Solution
-from stiction_ros.signals.arx_fit import Delays, fit_arx
+from stiction_ros.signals.arx_fit import Delays
 
 FEASIBILITY = 1e-6
 MAX_ITERATIONS = 60
@@ -54,26 +55,26 @@ class FrictionProgramme:
         x[: 2 * self.frame.valves] = (friction / self.data.op_span[:, None]).ravel()
         return x
 
-    def fitted(self, friction: FloatArray, smoothing: FloatArray) -> tuple[FloatArray, float]:
-        """Return unknowns with the least-squares coefficients of these frictions, and (12a).
+    def fitted(
+        self, friction: FloatArray, smoothing: FloatArray
+    ) -> tuple[FloatArray, EquationError]:
+        """Return unknowns with the least-squares coefficients of these frictions, and their fits.
 
         The frictions are rows (f_S, f_D), shape (m, 2), %; τ is one a valve, 1/%.
         """
         span, data = self.data.op_span, self.data
         stems = data.law.stems(data.op.T, friction / span[:, None], smoothing * span)
-        x, total = self.start(friction), 0.0
-        for i, (y, row) in enumerate(zip(data.pv, self.delays, strict=True)):
-            kept = data.orders.kept(i, self.frame.valves)
-            fit = fit_arx(y, stems, row, data.orders, kept)
+        found = fit_outputs(data.pv.T, stems, self.delays, data.orders)
+        x = self.start(friction)
+        for i, fit in enumerate(found.fits):
             theta = np.concatenate([fit.a, fit.b.ravel(), [fit.constant]])
             place = 2 * self.frame.valves + i * self.frame.width
-            free = np.flatnonzero(np.append(kept, True))
+            free = np.flatnonzero(np.append(data.orders.kept(i, self.frame.valves), True))
             part = np.linalg.solve(
                 self.frame.basis[i][np.ix_(free, free)], (theta - self.frame.theta[i])[free]
             )
             x[place + free] = part
-            total += fit.squared_error
-        return x, total / self.frame.outputs
+        return x, found
 
     def solve(self, x: FloatArray, smoothing: FloatArray) -> Solution:
         """Run IPOPT once from ``x``, then solve the coefficients with the frictions held."""
@@ -88,11 +89,11 @@ class FrictionProgramme:
         end = np.array(answer["x"]).ravel()
         slack = np.array(answer["g"]).ravel()
         friction = end[:count].reshape(-1, 2) * self.data.op_span[:, None]
-        objective = float(answer["f"]) * self.frame.start_error
+        objective, stable = float(answer["f"]) * self.frame.start_error, False
         if np.isfinite(end).all():
-            polished, least = self.fitted(friction, smoothing)
-            if not least >= objective:
-                end, objective = polished, least
+            found = self.fitted(friction, smoothing)[1]
+            objective = float(np.fmin(objective, found.squared_error))
+            stable = max(fit.largest_root for fit in found.fits) < 1.0
         finite = bool(np.isfinite(end).all() and np.isfinite(slack).all())
         return Solution(
             friction=friction,
@@ -100,7 +101,7 @@ class FrictionProgramme:
             status=str(stats["return_status"]),
             iterations=int(stats["iter_count"]),
             feasible=finite and bool(slack.min(initial=0.0) >= -FEASIBILITY),
-            stable=finite and max(fit.largest_root for fit in self.frame.models(end)) < 1.0,
+            stable=finite and stable,
         )
 
     def _build_solver(self) -> Any:

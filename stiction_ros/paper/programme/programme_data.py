@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.paper.smoothed_laws import SmoothLaw, smooth_law
-from stiction_ros.signals.arx_fit import ArxFit, ArxOrders, Delays, regressors, stable_arx
+from stiction_ros.signals.arx_fit import ArxOrders, Delays, regressors, stable_arx
 
 
 def stem_functions(samples: int, law: SmoothLaw) -> tuple[Any, ...]:
@@ -41,9 +41,7 @@ class ProgrammeData:
 
     op: FloatArray  # OP about its mean over its span, shape (m, N)
     pv: FloatArray  # PV about its mean, engineering units, shape (p, N)
-    op_mean: FloatArray  # op_mean, op_span: shape (m,), %
-    op_span: FloatArray
-    pv_mean: FloatArray  # shape (p,)
+    op_span: FloatArray  # shape (m,), %
     limit: FloatArray  # f_max = Δu of every valve, shape (m,), %
     orders: ArxOrders  # n_a, n_b, ε
     law: SmoothLaw  # of the valves
@@ -54,11 +52,9 @@ class ProgrammeData:
         cls, op: FloatArray, pv: FloatArray, limit: FloatArray, orders: ArxOrders, law: str = "he"
     ) -> "ProgrammeData":
         """Scale OP, shape (N, m), and centre PV, shape (N, p)."""
-        mean, span, level = op.mean(axis=0), np.ptp(op, axis=0), pv.mean(axis=0)
-        scaled, centred = ((op - mean) / span).T.copy(), (pv - level).T.copy()
-        taken = smooth_law(law)
-        stems = stem_functions(len(op), taken)
-        return cls(scaled, centred, mean, span, level, limit, orders, taken, stems)
+        span, taken = np.ptp(op, axis=0), smooth_law(law)
+        scaled, centred = ((op - op.mean(axis=0)) / span).T.copy(), (pv - pv.mean(axis=0)).T.copy()
+        return cls(scaled, centred, span, limit, orders, taken, stem_functions(len(op), taken))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,17 +127,3 @@ class Frame:
     def size(self) -> int:
         """Number of unknowns."""
         return 2 * self.valves + self.outputs * self.width
-
-    def models(self, x: FloatArray) -> tuple[ArxFit, ...]:
-        """Return the ARX models of unknowns ``x`` in engineering units, SE left at NaN."""
-        data, orders, made = self.data, self.data.orders, []
-        for i, row in enumerate(self.delays):
-            place = 2 * self.valves + i * self.width
-            theta = self.theta[i] + self.basis[i] @ x[place : place + self.width]
-            a = theta[: orders.output]
-            b = theta[orders.output : -1].reshape(self.valves, orders.input)
-            b = b / data.op_span[:, None]
-            constant = float(theta[-1] + data.pv_mean[i] * (1.0 + a.sum()))
-            constant -= float(b.sum(axis=1) @ data.op_mean)
-            made.append(ArxFit(row, a, b, constant, float("nan"), np.empty(0)))
-        return tuple(made)

@@ -58,8 +58,8 @@ class _Well:
         for angle in 0.3 + 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
             start = self.truth.copy()
             start[0] += apart * np.array([np.cos(angle), np.sin(angle)])
-            x, error = self.joint.fitted(start, smoothing)
-            begun.append(error)
+            x, found = self.joint.fitted(start, smoothing)
+            begun.append(found.squared_error)
             joint.append(self.joint.solve(x, smoothing).friction)
             reduced.append(self.reduced.solve(start, WIDTH).friction)
         least = self.criterion(self.truth)[0]
