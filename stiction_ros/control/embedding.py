@@ -210,7 +210,7 @@ class EmbeddingMpc(Formulation):
         problem = self._problems[i]
         stem = solution.plan + target.stem
         cost += self.cost.constant(state - target.state, last - target.stem, target.path)
-        pv = predicted_outputs(self.cost, state, target, solution)
+        pv = predicted_outputs(self.cost, state, target, solution.plan)
         strokes = [1 if form is None else form.strokes for form in self.forms]
         op = self.op_of(last, stem[np.array(strokes) - 1, np.arange(len(last))])
         return Plan(op, stem, pv, solution.slack, problem.jumps, converged, cost)

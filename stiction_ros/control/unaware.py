@@ -56,7 +56,7 @@ class UnawareMpc(Formulation):
         stem = found.plan + target.stem
         low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
         op = np.minimum(np.maximum(stem[0], low), high)
-        pv = predicted_outputs(self.cost, state, target, found)
+        pv = predicted_outputs(self.cost, state, target, found.plan)
         return Plan(op, stem, pv, found.slack, converged=converged, cost=cost)
 
     def _cut_plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
@@ -86,13 +86,13 @@ class UnawareMpc(Formulation):
 
 
 def predicted_outputs(
-    cost: HorizonCost, state: FloatArray, target: Target, found: HorizonSolution
+    cost: HorizonCost, state: FloatArray, target: Target, plan: FloatArray
 ) -> FloatArray:
-    """Return outputs at samples 0 … N, shape (N + 1, p), of the plan ``found``."""
+    """Return outputs at samples 0 … N, shape (N + 1, p), of stems less χ_ss, shape (N, m)."""
     deviation = state - target.state
     pv = np.empty((cost.horizon + 1, len(target.pv)))
     pv[0] = cost.model.c @ deviation + target.pv
-    pv[1:] = cost.outputs(deviation, found.plan) + target.pv
+    pv[1:] = cost.outputs(deviation, plan) + target.pv
     return pv
 
 

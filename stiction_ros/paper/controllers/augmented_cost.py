@@ -9,7 +9,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.control.horizon import HorizonCost
-from stiction_ros.control.horizon_qp import slack_weights
 from stiction_ros.control.target import Target
 from stiction_ros.effects import HeStiction, KanoStiction, XchStiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
@@ -59,12 +58,7 @@ class AugmentedCost:
             + (u_i - u_s)^T R (u_i - u_s) + (\xi_N - \xi_{ss})^T V_F (\xi_N - \xi_{ss}),
         \quad z_i = (\chi_{i-1}, \xi_i).
 
-    Where the weights have S on Δu as well, as (19a) does, it is added; and where outputs have soft
-    bounds, the squares of how far each sample is beyond them.
-
-    Attributes:
-        bounds: of the outputs, shape (p, 2), or (1, 2) where none has any.
-        soft: how dear that is, shape (p,); 0 where an output has no bounds.
+    Where the weights have S on Δu as well, as (19a) does, it is added.
     """
 
     def __init__(
@@ -72,16 +66,11 @@ class AugmentedCost:
         model: LinearModel,
         weights: AugmentedWeights,
         frictions: Sequence[PrintedFriction | None],
-        bounds: FloatArray | None = None,
     ) -> None:
-        """Condense, for ``frictions`` with None for a healthy valve and ``bounds``, (p, 2)."""
+        """Condense, for ``frictions`` with None for a healthy valve."""
         self.model, self.weights, self.frictions = model, weights, tuple(frictions)
         self.part = HorizonCost(model, weights)
         self.horizon = weights.horizon
-        self.bounds = np.array([[-np.inf, np.inf]]) if bounds is None else bounds
-        bounded = np.isfinite(self.bounds).any(axis=1)
-        # Half the square of the largest excess costs as much in the exact formulations.
-        self.soft = np.where(bounded, slack_weights(self.part) / (2.0 * self.horizon), 0.0)
 
     def stems(self, op: FloatArray, start: FloatArray) -> FloatArray:
         """Return stems, shape (N, m), %, for ``op`` (N, m), from rest at ``start`` (m,)."""
@@ -109,13 +98,4 @@ class AugmentedCost:
         if weights.op_move is not None:
             moves = np.diff(np.vstack([situation.op_before, op]), axis=0)
             cost += float(np.sum(moves * (moves @ weights.op_move)))
-        if self.soft.any():
-            cost += float(np.sum(self.beyond(situation, stems) ** 2 @ self.soft))
         return cost + float(np.sum(away * (away @ weights.op)))
-
-    def beyond(self, situation: PlanProblem, stems: FloatArray) -> FloatArray:
-        """Return how far each output is beyond its bounds at samples 1 … N, shape (N, p)."""
-        target = situation.target
-        pv = self.part.outputs(situation.state - target.state, stems - target.stem) + target.pv
-        low, high = self.bounds.T
-        return np.asarray(np.maximum(np.maximum(pv - high, low - pv), 0.0))

@@ -1,7 +1,6 @@
 """MPC as the paper prints it: stiction embedding, safeguarded by the hard model, and inversion."""
 
 import dataclasses
-import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,7 +9,7 @@ from stiction_ros.control.formulation import Formulation
 from stiction_ros.control.horizon import HorizonLimits
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.control.target import Target
-from stiction_ros.control.unaware import UnawareMpc
+from stiction_ros.control.unaware import UnawareMpc, predicted_outputs
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.paper.controllers.augmented_cost import (
@@ -40,7 +39,7 @@ class PrintedEmbeddingMpc(Formulation):
     At τ = 10⁴ the smoothed model has no slope towards another pattern of slips, so IPOPT
     keeps or loses the pattern it starts with. Its answer and its warm start are therefore
     both simulated with the hard model, and the cheaper is applied. Soft bounds of the outputs
-    enter the programme where its answer breaks one without them.
+    do not enter it; the plan tells by how much it breaks them.
     """
 
     mode = ControlMode.EMBEDDING
@@ -56,8 +55,8 @@ class PrintedEmbeddingMpc(Formulation):
         known = printed_frictions(frictions)
         _check(limits, known)
         self.tuning, self.frictions = tuning, known
-        self._limits = limits.stem
-        self.cost = AugmentedCost(model, tuning.weights, known, limits.output)
+        self._limits, self._bounds = limits.stem, limits.output
+        self.cost = AugmentedCost(model, tuning.weights, known)
         self._programme = SmoothedProgramme(self.cost, tuning, limits.stem)
         searches = tuning.warm_start is WarmStart.SEARCH
         self._search = SearchedStart(self.cost, limits.stem) if searches else None
@@ -70,32 +69,24 @@ class PrintedEmbeddingMpc(Formulation):
         stems = self.cost.stems(start, last)
         start_cost = self.cost.of_stems(situation, start, stems)
         found = self._programme.solve(situation, start, stems)
-        if found.op is not None and self._breaks_bounds(situation, found.op):
-            found = self._bounded_programme.solve(situation, start, stems)
         cost = float("inf") if found.op is None else self.cost(situation, found.op)
         if not np.isfinite(min(cost, start_cost)):
             return None
         op = found.op if found.op is not None and cost <= start_cost else start
         self._before = op[0].copy()
         stems = self.cost.stems(op, last)
+        pv = predicted_outputs(self.cost.part, state, target, stems - target.stem)
+        low, high = self._bounds.T
         return PrintedPlan(
             op[0].copy(),
             stems,
-            self._outputs(situation, stems),
-            self.cost.beyond(situation, stems).max(axis=0),
+            pv,
+            np.maximum(np.maximum(pv[1:] - high, low - pv[1:]), 0.0).max(axis=0),
             self._jumps(stems, last),
             iterations=found.iterations,
             programme_cost=cost,
             warm_start_cost=start_cost,
         )
-
-    @functools.cached_property
-    def _bounded_programme(self) -> SmoothedProgramme:
-        return SmoothedProgramme(self.cost, self.tuning, self._limits, bounded=True)
-
-    def _breaks_bounds(self, situation: PlanProblem, op: FloatArray) -> bool:
-        beyond = self.cost.beyond(situation, self.cost.stems(op, situation.stem))
-        return bool(self.cost.soft.any() and beyond.any())
 
     def warm_start(self, situation: PlanProblem) -> FloatArray:
         """Return the sequence that the programme starts from, shape (N, m), %."""
@@ -118,12 +109,6 @@ class PrintedEmbeddingMpc(Formulation):
                 a, horizon = self.tuning.first_move, self.cost.horizon
                 op[:, j] = compensation(friction, float(before[j]), ends, horizon, a)
         return np.clip(op, self._limits[:, 0], self._limits[:, 1])
-
-    def _outputs(self, situation: PlanProblem, stems: FloatArray) -> FloatArray:
-        target, part = situation.target, self.cost.part
-        state = situation.state - target.state
-        now = part.model.c @ state
-        return np.vstack([now, part.outputs(state, stems - target.stem)]) + target.pv
 
     def _jumps(self, stems: FloatArray, last: FloatArray) -> int:
         moves = np.diff(np.vstack([last, stems]), axis=0) != 0.0

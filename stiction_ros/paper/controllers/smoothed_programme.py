@@ -30,22 +30,17 @@ class SmoothedProgramme:
         \xi_{i+1} - \xi_{ss} = A (\xi_i - \xi_{ss}) + B (\chi_i - \chi_{ss}), \quad
         0 \le u_i, \chi_i \le 100.
 
-    Soft bounds of the outputs add the squares of what is beyond them to the cost.
-
     The steady state of the target carries bias and measured disturbances, which stay as they
     are over the horizon. A law with a direction of motion brings that as an unknown more, which
     is 0 at the start: the valve rests. The programme is built once; estimate, target and friction
     are its parameters.
     """
 
-    def __init__(
-        self, cost: AugmentedCost, tuning: PaperTuning, limits: FloatArray, bounded: bool = False
-    ) -> None:
-        """Build; ``limits`` (m, 2), %, ``bounded`` with the soft bounds of the cost."""
+    def __init__(self, cost: AugmentedCost, tuning: PaperTuning, limits: FloatArray) -> None:
+        """Build; ``limits`` (m, 2), %."""
         from stiction_ros.paper.smoothed_laws import smooth_law  # compiled: slow to import
 
         self.cost, self.model, self.tuning = cost, cost.model, tuning
-        self._bounded = bounded
         self._sticky = [j for j, friction in enumerate(cost.frictions) if friction is not None]
         pairs = [friction for friction in cost.frictions if friction is not None]
         self._friction = np.array([(f.static_friction, f.dynamic_friction) for f in pairs])
@@ -68,7 +63,6 @@ class SmoothedProgramme:
         start = casadi.SX.sym("z_0", n), casadi.SX.sym("chi_before", m)
         goal, before = casadi.SX.sym("chi_ss", m), casadi.SX.sym("u_before", m)
         friction = casadi.SX.sym("friction", len(sticky), 2)
-        pv_goal = casadi.SX.sym("y_ss", len(model.pv0))
         state, stem = start
         last, ways = before, [casadi.SX(0.0) for _ in sticky]
         unknowns, residuals, cost = [], [], 0.0
@@ -94,13 +88,11 @@ class SmoothedProgramme:
             cost += _square(moved - stem, weights.move) + _square(op - goal, weights.op)
             if weights.op_move is not None:
                 cost += _square(op - last, weights.op_move)
-            if self._bounded:
-                cost += self._excess(casadi.mtimes(model.c, after) + pv_goal)
             state, stem, last = after, moved, op
         cost += _square(state, weights.terminal)
         problem = {
             "x": casadi.vertcat(*unknowns),
-            "p": casadi.vertcat(*start, goal, before, casadi.vec(friction), pv_goal),
+            "p": casadi.vertcat(*start, goal, before, casadi.vec(friction)),
             "f": cost,
             "g": casadi.vertcat(*residuals),
         }
@@ -124,7 +116,6 @@ class SmoothedProgramme:
             target.stem,
             situation.op_before,
             self._friction.T.reshape(-1),
-            target.pv,
         )
         solution = self._solver(
             x0=self._guess(situation, op, stems),
@@ -154,17 +145,6 @@ class SmoothedProgramme:
         moves = np.diff(np.vstack([situation.stem[self._sticky], stuck]), axis=0)
         turns = np.sign(moves[:, self._directed])
         return np.hstack([op, stuck, turns, states]).reshape(-1)
-
-    def _excess(self, pv: Any) -> Any:
-        import casadi
-
-        cost, dear = casadi.SX(0.0), self.cost.soft
-        for j in np.flatnonzero(dear):
-            low, high = self.cost.bounds[j]
-            above = casadi.fmax(pv[j] - high, 0.0) if np.isfinite(high) else 0.0
-            below = casadi.fmax(low - pv[j], 0.0) if np.isfinite(low) else 0.0
-            cost += dear[j] * (above**2 + below**2)
-        return cost
 
 
 def _square(vector: Any, weight: FloatArray) -> Any:

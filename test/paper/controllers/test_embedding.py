@@ -96,24 +96,16 @@ def test_bounds_that_it_does_not_know_are_refused() -> None:
     assert (caught.value.where, bool(caught.value.fix)) == ("op_rate_limits", True)
 
 
-def test_a_soft_output_bound_keeps_the_plan_nearer_to_it() -> None:
+def test_soft_bounds_change_no_plan_and_are_told_as_slack() -> None:
     at = situation(MODEL, 12.0)
     free = plan(controller(), at)
-    high = float(free.pv[1:, 0].max()) - 0.1 * float(np.ptp(free.pv[:, 0]))
+    high = float(free.pv[1:, 0].max()) - 0.1
     soft = np.array([[-np.inf, high], [-np.inf, np.inf]])
     limits = dataclasses.replace(limits_for(MODEL), output=soft)
     bounded = plan(PrintedEmbeddingMpc(MODEL, tuning(MODEL), limits, (STICKY, None)), at)
+    assert bounded.op.tolist() == free.op.tolist()
     assert free.slack == pytest.approx([0.0, 0.0])
-    assert bounded.slack[0] == pytest.approx(max(bounded.pv[1:, 0].max() - high, 0.0))
-    assert bounded.slack[0] < 0.01 * (free.pv[1:, 0].max() - high)
-
-
-def test_bounds_that_nothing_comes_near_change_nothing() -> None:
-    limits = limits_for(MODEL, output=(-1e4, 1e4))
-    for away in (2.0, 12.0):
-        mpc = PrintedEmbeddingMpc(MODEL, tuning(MODEL), limits, (STICKY, None))
-        at = situation(MODEL, away)
-        assert plan(mpc, at).op.tolist() == plan(controller(), at).op.tolist()
+    assert bounded.slack == pytest.approx([0.1, 0.0])
 
 
 def test_a_loop_without_sticky_valves_is_refused() -> None:
@@ -164,19 +156,6 @@ def test_the_plain_cost_penalises_op_and_not_the_stem() -> None:
     wanted += states[-1] @ unaware.terminal @ states[-1]
     assert cost(at, rest) == pytest.approx(0.0, abs=1e-9)
     assert cost(at, moved) == pytest.approx(wanted)
-
-
-def test_the_programme_prices_soft_bounds_as_it_is_judged() -> None:
-    at = situation(MODEL, 12.0)
-    op = np.tile(at.target.stem, (12, 1))
-    bounds = np.column_stack([np.full(2, -np.inf), at.target.pv])
-    chosen = tuning(MODEL)
-    judged = AugmentedCost(MODEL, chosen.weights, (STICKY, None), bounds)
-    programme = SmoothedProgramme(judged, chosen, LIMITS, bounded=True)
-    found = programme.solve(at, op, judged.stems(op, at.stem))
-    assert found.op is not None
-    assert judged.beyond(at, judged.stems(found.op, at.stem)).max() > 0.0
-    assert found.cost == pytest.approx(judged(at, found.op), rel=1e-4)
 
 
 @pytest.mark.parametrize("cost", list(ProgrammeCost))
