@@ -139,7 +139,8 @@ class HorizonQp:
         if self.size == 0:
             plan = offset.reshape(self.cost.horizon, -1)  # nothing is left to decide
             slack = self.slack(state, plan, target_pv)
-            return HorizonSolution(plan, base + self.slack_cost(slack), slack)
+            price = 0.5 * float(self._slack_weight @ slack[self._bounded] ** 2)
+            return HorizonSolution(plan, base + price, slack)
         self._hard.lower[:], self._hard.upper[:] = lower, upper
         found = self._solved(self._hard, linear)
         if found is None:
@@ -184,10 +185,6 @@ class HorizonQp:
         slack = np.zeros(len(target_pv))
         slack[self._bounded] = np.maximum(beyond, 0.0).max(axis=0, initial=0.0)
         return slack
-
-    def slack_cost(self, slack: FloatArray) -> float:
-        """Return what ``slack`` (p,) adds to the cost."""
-        return 0.5 * float(self._slack_weight @ slack[self._bounded] ** 2)
 
     def _fill_bounds(
         self,

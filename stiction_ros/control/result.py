@@ -29,7 +29,7 @@ class StepStatus(enum.StrEnum):
 
     SOLVED = "solved"
     UNREACHABLE = "unreachable"  # solved for the nearest reachable set-point
-    LIMIT = "limit"  # out of iterations; a checked plan is applied
+    LIMIT = "limit"  # patterns out of iterations; the cheapest of the others is applied
     SHIFTED = "shifted"  # the rest of an earlier plan is applied
     SUBSTITUTED = "substituted"  # the unaware controller stands in
     FALLBACK = "fallback"  # OP goes to the safe value
@@ -50,7 +50,7 @@ class Plan:
     pv: FloatArray  # outputs at samples 0 … N, shape (N + 1, p)
     slack: FloatArray  # violation of the soft output bounds, shape (p,)
     jumps: int = 0  # number of valve jumps planned over the horizon
-    converged: bool = True  # whether the solver finished; otherwise the plan was checked instead
+    converged: bool = True  # whether no pattern ran out of iterations
     cost: float = float("nan")  # value of (19a) with prices of jumps and slacks, NaN if unknown
     # what the observer takes for the stem at the first sample, shape (m,), %; None for the stem
     # that the valve models expect of ``op``

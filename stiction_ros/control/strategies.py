@@ -1,7 +1,7 @@
 """What a controller applies, in the order in which it is tried.
 
 1. ``solve``: the formulation's plan, solved to the end.
-2. ``limit``: its plan when the solver ran out of iterations, checked by the formulation.
+2. ``limit``: its plan when other patterns ran out of iterations.
 3. ``shift``: the next sample of an earlier plan, at most ``hold_after`` samples old.
 4. ``unaware``: the plan of the unaware controller, where another one was in force.
 5. ``fallback``: after ``fallback_after`` samples of holding, a ramp to a safe OP.

@@ -8,7 +8,6 @@ import numpy as np
 from stiction_ros.control.belief import ValveBeliefs, jump_form
 from stiction_ros.control.formulation import Formulation
 from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonWeights
-from stiction_ros.control.horizon_qp import HorizonSolution
 from stiction_ros.control.pattern_problem import PatternProblem, StickyState
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.control.target import Target
@@ -29,60 +28,19 @@ class UnawareMpc(Formulation):
         self._problem = PatternProblem(self.cost, limits, (None,) * model.b.shape[1])
 
     def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
-        """Return the best plan from state ξ̂ (n,) and the last stems (m,), or None.
-
-        Out of iterations, the plan without bounds is cut to them, and returned if it is
-        cheaper than leaving the stems where they are.
-        """
+        """Return the best plan from state ξ̂ (n,) and the last stems (m,), or None."""
         none = np.zeros_like(last)
         valves = StickyState(last, np.column_stack([last, last]), none, none, none)
-        solution = self._problem.solve(state, target, valves)
-        if solution is not None:
-            z, before = state - target.state, last - target.stem
-            cost = solution.cost + self.cost.constant(z, before, target.path)
-            return self._plan(state, target, solution, cost)
-        if self._problem.qp.limit_reached:
-            return self._cut_plan(state, target, last)
-        return None
-
-    def _plan(
-        self,
-        state: FloatArray,
-        target: Target,
-        found: HorizonSolution,
-        cost: float,
-        converged: bool = True,
-    ) -> Plan:
+        found = self._problem.solve(state, target, valves)
+        if found is None:
+            return None
+        cost = found.cost
+        cost += self.cost.constant(state - target.state, last - target.stem, target.path)
         stem = found.plan + target.stem
         low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
         op = np.minimum(np.maximum(stem[0], low), high)
         pv = predicted_outputs(self.cost, state, target, found.plan)
-        return Plan(op, stem, pv, found.slack, converged=converged, cost=cost)
-
-    def _cut_plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
-        z, before = state - target.state, last - target.stem
-        linear = self.cost.linear(z, before, target.path)
-        free = np.linalg.solve(self.cost.hessian, -linear).reshape(self.cost.horizon, -1)
-        low, high = (self.limits.stem - target.stem[:, None]).T
-        cut = np.empty_like(free)
-        stem = np.clip(before, low, high)
-        for i, wanted in enumerate(free):
-            stem = np.clip(
-                np.clip(wanted, stem - self.limits.move, stem + self.limits.move), low, high
-            )
-            cut[i] = stem
-        stay = np.tile(np.clip(before, low, high), (self.cost.horizon, 1))
-        both = []
-        for plan in (cut, stay):
-            v, slack = plan.reshape(-1), self._problem.qp.slack(z, plan, target.pv)
-            cost = float(v @ (0.5 * self.cost.hessian @ v + linear))
-            cost += self.cost.constant(z, before, target.path)
-            cost += self._problem.qp.slack_cost(slack)
-            found = HorizonSolution(plan, cost, slack)
-            both.append(self._plan(state, target, found, cost, converged=False))
-        if not np.isfinite(both[0].cost) or both[0].cost > both[1].cost:
-            return None
-        return both[0]
+        return Plan(op, stem, pv, found.slack, cost=cost)
 
 
 def predicted_outputs(
