@@ -181,7 +181,7 @@ class EmbeddingRun:
             pv, op: of the samples before the first, shape (K,) each.
         """
         self.controller = design.controller()
-        self._no_dv: FloatArray = np.zeros(0)
+        self._no_dv = np.zeros(self.controller.design.model.e.shape[1])
         if len(op):
             past = History(op[:, None], pv[:, None], np.zeros((len(op), 0)))
             self.controller.take_over(past)
