@@ -11,9 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from stiction_ros.control import ControlMode, MpcController
 from stiction_ros.control.design import ControlDesign
-from stiction_ros.control.horizon import HorizonCost
-from stiction_ros.control.observer import Observer
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.gain.draws import Draws
 from stiction_ros.gain.measures import Measures
@@ -45,6 +44,10 @@ WORTH = 0.03
 
 FREQUENCIES = 300
 """Frequencies at which the sensitivity is looked at."""
+
+PULSE = 1000
+"""Samples of the answer of a predictive controller to a pulse of PV."""
+
 FASTEST = 3.0
 """Times the recorded loop's crossover up to which a promise is made.
 
@@ -188,44 +191,22 @@ def times_as_fast(loop: RecordedLoop, design: ControlDesign, draws: Draws) -> fl
 
 
 def predictive_response(design: ControlDesign, turn: ComplexArray) -> ComplexArray:
-    r"""Return C' from SP − PV to the stem, shape (F,), of one valve and one output.
-
-    With the observer's gains :math:`K_x, K_d` and the first row :math:`K_z, K_v` of the horizon's
-    solution, one sample of it is
-
-    .. math::
-        e &= y - C \hat\xi - \hat d \\
-        \hat\xi^+ &= \hat\xi + K_x e, \quad \hat d^+ = \hat d + K_d e \\
-        \chi_{ss} &= -\hat d^+ / g_\infty, \quad \xi_{ss} = (I - A)^{-1} B \chi_{ss} \\
-        \chi &= \chi_{ss} - K_z (\hat\xi^+ - \xi_{ss}) - K_v (\chi^- - \chi_{ss}).
+    """Return C' from SP − PV to the stem, shape (F,), by how OP answers a pulse of PV.
 
     Args:
-        design: of the controller; the weights are those of the embedding.
+        design: of the controller of one valve and one output; the weights are the embedding's.
         turn: the backward shift q at each frequency, shape (F,).
     """
-    a, b, c, d = _states(design)
-    eye = np.eye(len(a))
-    return np.array([-(c @ np.linalg.solve(eye / q - a, b) + d) for q in turn])
-
-
-def _states(design: ControlDesign) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return the controller from PV to stem as a state space of (ξ̂, d̂, χ⁻)."""
-    model = design.model
-    n, b, c = model.order, model.b[:, 0], model.c[0]
-    cost = HorizonCost(model, design.embedding)
-    linear = np.hstack([cost.from_state, cost.from_last])
-    k = np.linalg.solve(cost.hessian, linear)[0]
-    gain = Observer(model, design.observer).gain[:, 0]
-    rest = np.linalg.solve(np.eye(n) - model.a, b)
-    # Rows on (ξ̂, d̂, χ⁻, y).
-    error = np.concatenate([-c, [-1.0, 0.0, 1.0]])
-    state = np.eye(n, n + 3) + np.outer(gain[:n], error)
-    load = np.eye(1, n + 3, n)[0] + gain[n] * error
-    aim = -load / float(c @ rest)
-    last = np.eye(1, n + 3, n + 1)[0]
-    stem = aim - k[:n] @ (state - np.outer(rest, aim)) - k[n] * (last - aim)
-    following = np.vstack([model.a @ state + np.outer(b, stem), load, stem])
-    return following[:, :-1], following[:, -1], stem[:-1], float(stem[-1])
+    linear = dataclasses.replace(design, unaware=design.embedding)
+    control, model = MpcController(linear, ControlMode.UNAWARE), design.model
+    pulse, dv = np.sqrt(design.observer.measurement_noise), np.zeros(model.e.shape[1])
+    control.start(model.stem0, model.pv0)
+    op = [model.stem0]
+    for k in range(PULSE):
+        pv = model.pv0 + pulse if k == 0 else model.pv0
+        op.append(control.step(pv, model.pv0, dv, op[-1]).op)
+    moves = np.diff(op, axis=0)[:, 0] / pulse[0]
+    return np.asarray(-(turn[:, None] ** np.arange(PULSE) @ moves) / (1.0 - turn))
 
 
 def _crossover(open_loop: ComplexArray) -> float:
