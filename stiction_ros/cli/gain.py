@@ -100,7 +100,7 @@ def _of_record(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
 
 
 def show(found: Any, verdict: Mapping[str, Any]) -> None:
-    """Print the ``verdict`` on the valve, what each option brings, its interval, and notes."""
+    """Print the ``verdict`` on the valve, what each option brings and its interval."""
     console = Console()
     console.print(_headline(found, verdict), highlight=False)
     table = Table()
@@ -117,8 +117,6 @@ def show(found: Any, verdict: Mapping[str, Any]) -> None:
     )
     for option in found.options:
         console.print(f"{option.what}: {option.note}", highlight=False)
-    for note in found.notes:
-        console.print(f"note: {note}", highlight=False)
     console.print(advice(found.to_dict()), highlight=False)
 
 

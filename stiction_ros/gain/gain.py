@@ -21,8 +21,6 @@ from stiction_ros.records.record import Record
 # loop at the 5th or 95th percentile is not given
 AGREED = 0.25
 AGREED_NOW = 0.05  # the same as a share of now
-EMBEDDING_SAMPLES = 1000  # samples of a run of the embedding, the last ones
-TAKEN_OVER = 200  # samples before this run that the controller takes over
 ENDS = (5.0, 95.0)  # percentiles of the draws that are given as interval
 # share by which a drawn loop may differ from the record in IAE and amplitude; a loop that differs
 # more is not the recorded one
@@ -130,7 +128,6 @@ class Gain:
     output: str
     now: Measures  # of the record
     options: tuple[Option, ...]  # in the order of ``What``
-    notes: tuple[str, ...] = ()  # remarks for people
 
     def option(self, what: What) -> Option:
         """Return one option."""
@@ -143,7 +140,6 @@ class Gain:
             "output": self.output,
             "now": dict(vars(self.now)),
             "options": [option.to_dict() for option in self.options],
-            "notes": list(self.notes),
         }
 
 
@@ -243,7 +239,7 @@ def _embedding(loop: RecordedLoop, found: Identification, now: Measures) -> Opti
             f"No more than {len(kept)} of {DRAWS} loops with possible frictions repeat the record."
         )
         return Option(What.EMBEDDING, None, {}, note)
-    draws, part = draws.taken(kept), embedding_part(loop)
+    draws, part = draws.taken(kept), loop.embedding_part()
     try:
         design = EmbeddingDesign.of(loop)
         ratio = times_as_fast(loop, design.built(), draws)
@@ -262,11 +258,6 @@ def _embedding(loop: RecordedLoop, found: Identification, now: Measures) -> Opti
         note = f"{note} In {gone} of them the loop grows without end."
         return Option(What.EMBEDDING, None, {}, note, weights)
     return option_of(What.EMBEDDING, runs, note, weights).beside(now, part.now())
-
-
-def embedding_part(loop: RecordedLoop) -> RecordedLoop:
-    """Return the rows of a loop on which the embedding is run, behind those it takes over."""
-    return loop.last(EMBEDDING_SAMPLES, TAKEN_OVER)
 
 
 def option_of(

@@ -61,6 +61,12 @@ from stiction_ros.signals.oscillation import NEEDED_CYCLES
 MOST = 4000
 """Samples that are run again, the last ones: hundreds of cycles say no more."""
 
+EMBEDDING_SAMPLES = 1000
+"""Samples of a run of the embedding, the last ones."""
+
+TAKEN_OVER = 200
+"""Samples before this run that the controller takes over, no more than a third of all."""
+
 
 @dataclasses.dataclass(frozen=True)
 class RecordedLoop:
@@ -163,16 +169,11 @@ class RecordedLoop:
         stem = self.loop.stem[rows, self.valve]
         return self.yardstick.measure(self.pv_scale * error, self.op_scale * stem)
 
-    def last(self, samples: int, past: int) -> "RecordedLoop":
-        """Return the loop with no more than its last ``samples`` rows.
-
-        Args:
-            samples: rows that are kept, at most.
-            past: rows of the longest stretch that are before them, as far as a third of it goes.
-        """
+    def embedding_part(self) -> "RecordedLoop":
+        """Return the loop with the rows on which the embedding is run, behind those taken over."""
         first, last = self.loop.longest
-        ahead = first + min(past, (last - first) // 3)
-        row = max(self.rows[0], last - samples, ahead)
+        ahead = first + min(TAKEN_OVER, (last - first) // 3)
+        row = max(self.rows[0], last - EMBEDDING_SAMPLES, ahead)
         ahead = row - self.rows[0]
         stretches = [(max(a - ahead, 0), b - ahead) for a, b in self.yardstick.stretches]
         yardstick = dataclasses.replace(

@@ -7,7 +7,7 @@ from stiction_ros.effects import Stiction, from_mapping
 from stiction_ros.errors import InputError
 from stiction_ros.gain.draws import DRAWS, Draws, drawn_frictions, possible_frictions, resampled
 from stiction_ros.gain.embedding import RUNS, EmbeddingDesign, embedded, pair_of
-from stiction_ros.gain.gain import Gain, Option, What, embedding_part, gain_of
+from stiction_ros.gain.gain import Gain, Option, What, gain_of
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.model_gain import gain_of_model
 from stiction_ros.gain.recorded_loop import RecordedLoop
@@ -139,7 +139,7 @@ def test_the_embedding_takes_over_and_does_not_rest_off_its_place(
     loop: RecordedLoop, draws: Draws, gain: Gain
 ) -> None:
     """Begun cold, its slip check believed in a larger friction and the stem never moved again."""
-    part = embedding_part(loop)
+    part = loop.embedding_part()
     now = part.now().iae_per_hour
     runs = embedded(part, EmbeddingDesign.of(loop), draws)
     assert len(runs) == RUNS

@@ -13,7 +13,7 @@ from stiction_ros.cli.shared.as_json import write_json
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.gain.embedding import EmbeddingDesign, EmbeddingRun
-from stiction_ros.gain.gain import Gain, What, embedding_part, gain_of
+from stiction_ros.gain.gain import Gain, What, gain_of
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
 from stiction_ros.identification import identify
@@ -90,7 +90,7 @@ def judge(seed: int) -> Judged:
         )
     promises = _promises(gain, true, now)
     if gain.option(What.EMBEDDING).measures is not None:
-        part = embedding_part(loop)
+        part = loop.embedding_part()
         late = _rows(again, part)
 
         def behind(run: Sampled) -> Measures:
