@@ -23,7 +23,7 @@ from stiction_ros.online.monitor.gap_monitor import GapMonitor
 
 COUNTED = ("bridged", "repeated", "stale", "future")
 SHOWN_AGAIN = 3.0  # s: a plant in lockstep shows its sample each second
-FIGURES = ("gap", "baseline", "growth", "limit", "free_run_rmse", "noise_floor")  # of an output
+FIGURES = ("gap", "baseline", "growth", "limit")  # of an output
 
 
 class EstimatorNode(ManagedNode):

@@ -5,8 +5,6 @@ import math
 
 import numpy as np
 
-from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.measure import measure_gap
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
 from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
@@ -30,7 +28,6 @@ class OutputBaseline:
     # square is taken from BATCHES batches, so that heavy tails and bursts widen the limit
     freedom: float
     rows: int  # n₀
-    floor: float  # standard deviation of the noise in a free run, units of the output
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,8 +39,6 @@ class OutputLook:
     baseline: float  # the same in the baseline, s₀
     limit: float  # of s₁/s₀, for a healthy loop to exceed as seldom as asked
     back: float  # of s₁/s₀, below which a gap that had grown counts as gone
-    free_run_rmse: float  # of PV less the free run, on rows that nothing was fitted to
-    noise_floor: float  # standard deviation of the noise of the baseline in a free run
 
     @property
     def growth(self) -> float:
@@ -96,7 +91,6 @@ def look_at(
     from scipy.stats import f as fisher
 
     run = FreeRun(model, join_records(model, [record]))
-    shares = measure_gap(Baseline.of(run))
     looks = []
     for i, base in enumerate(known):
         rows = run.blocks(i).scored  # held-out ones included
@@ -106,8 +100,7 @@ def look_at(
             math.sqrt(float(fisher.isf(level / len(known), freedom, base.freedom)))
             for level in (chance, max(CLEARED, chance))
         )
-        rmse = shares[i].free_run_rmse
-        looks.append(OutputLook(base.name, gap, base.std, limit, back, rmse, base.floor))
+        looks.append(OutputLook(base.name, gap, base.std, limit, back))
     return tuple(looks)
 
 
@@ -123,14 +116,8 @@ def _output_baseline(run: FreeRun, output: int) -> OutputBaseline:
     means = np.array([batch.mean() for batch in np.array_split(squares, BATCHES) if len(batch)])
     spread = float(means.var(ddof=1)) / len(means) if len(means) > 1 else 0.0
     freedom = min(float(count), 2.0 * variance**2 / max(spread, 1e-300))
-    residual = float(np.sqrt(np.mean(noise.residual[rows] ** 2)))
     return OutputBaseline(
-        run.model.outputs[output],
-        noise.ar,
-        math.sqrt(variance),
-        max(freedom, 2.0),
-        int(rows.sum()),
-        min(noise.stationary_std, residual),
+        run.model.outputs[output], noise.ar, math.sqrt(variance), max(freedom, 2.0), int(rows.sum())
     )
 
 
