@@ -144,8 +144,6 @@ class Share:
     value: float  # by weighted least squares
     error: float  # its standard error, from how the episodes of moves differ
     information: float  # squared length of the signature, in σ
-    episodes: int  # episodes, moves: that the signature has in the stretch
-    moves: int
 
     @property
     def margin(self) -> float:
@@ -205,19 +203,12 @@ class Evidence:
         start = float(self.stem[max(first - 1, 0), valve])
         return simulate(find_law(str(law.law)), grid, op, start, further)
 
-    def signature(self, valve: int, stems: FloatArray) -> list[FloatArray]:
-        """Return what other ``stems``, (n,) or (n, G), %, would change, per output, in σ."""
-        trusted = self.stem[:, valve] if stems.ndim == 1 else self.stem[:, valve, None]
+    def signature(self, valve: int, first: int, stems: FloatArray) -> list[FloatArray]:
+        """Return what other stems from ``first`` on, (n − first, G), %, change per output, σ."""
+        moved = np.zeros((len(self.stem), stems.shape[1]))
+        moved[first:] = stems - self.stem[first:, [valve]]
         name = self.reference.valves[valve]
-        return [output.response(name, stems - trusted) for output in self.reference.outputs]
-
-    def gain(self, signature: list[FloatArray]) -> FloatArray:
-        """Return the log likelihood that each sample gives to other stems, shape (n, …)."""
-        total: FloatArray | float = 0.0
-        for seen, change in zip(self.innovations, signature, strict=True):
-            shown = seen if change.ndim == 1 else seen[:, None]
-            total = total + change * (shown - 0.5 * change)
-        return np.asarray(total)
+        return [output.response(name, moved) for output in self.reference.outputs]
 
     def gains(
         self, valve: int, first: int, stems: FloatArray, begin: int | None = None
@@ -232,12 +223,11 @@ class Evidence:
         Returned are log likelihoods over that of the trusted stems, (G,), and the mean squares of
         the innovations that are left, shape (G,).
         """
-        whole = np.repeat(self.stem[:, [valve]], stems.shape[1] + 1, axis=1)
-        whole[first:, 1:] = stems  # the first column is what is trusted
+        whole = np.hstack([self.stem[first:, [valve]], stems])  # what is trusted comes first
         total = np.zeros(whole.shape[1])
         rows = slice(first if begin is None else begin, None)
         for seen, change, gains in zip(
-            self.innovations, self.signature(valve, whole), self._gains, strict=True
+            self.innovations, self.signature(valve, first, whole), self._gains, strict=True
         ):
             left = seen[rows, None] - change[rows]
             columns = np.repeat(gains[rows, None, :], whole.shape[1], axis=1)
@@ -255,8 +245,8 @@ class Evidence:
         """Mean square of the innovations; 1 where process and frictions are as they were."""
         return float(np.mean([np.mean(seen[self.first :] ** 2) for seen in self.innovations]))
 
-    def share(self, valve: int, signature: list[FloatArray], first: int) -> Share:
-        """Return how much of ``signature`` the samples from ``first`` on show.
+    def share(self, valve: int, first: int, stems: FloatArray) -> Share:
+        """Return how much of other ``stems`` from ``first`` on, (n − first,), %, the samples show.
 
         An error of the process's gain is allowed for: what the stems as they are would explain
         by another gain is left out on both sides.
@@ -267,18 +257,19 @@ class Evidence:
         episode = np.cumsum(begins)
         count = int(episode[-1]) + 1
         seen, length = np.zeros(count), np.zeros(count)
+        signature = self.signature(valve, first, stems[:, None])
         for innovations, change, gains in zip(
             self.innovations, signature, self._gains, strict=True
         ):
             basis = np.linalg.qr(gains[first:])[0]
-            wanted = change[first:] - basis @ (basis.T @ change[first:])
+            wanted = change[first:, 0] - basis @ (basis.T @ change[first:, 0])
             shown = innovations[first:] - basis @ (basis.T @ innovations[first:])
             seen += np.bincount(episode, shown * wanted, count)
             length += np.bincount(episode, wanted * wanted, count)
         information = float(length.sum())
         if information <= 0.0:
-            return Share(0.0, math.inf, 0.0, count - 1, len(moves))
+            return Share(0.0, math.inf, 0.0)
         value = float(seen.sum()) / information
         spread = float(np.sum((seen - value * length) ** 2)) / information**2
         error = math.sqrt(max(spread, 1.0 / information) + MISMATCH**2)
-        return Share(value, error, information, count - 1, len(moves))
+        return Share(value, error, information)

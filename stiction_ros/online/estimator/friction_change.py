@@ -14,12 +14,9 @@ from stiction_ros.settings import setting
 
 SUSPICION = 20.0  # log likelihood against the trusted friction from which no window revises it
 CERTAINTY = 30.0  # log likelihood that a larger friction needs over every one near the trusted
-RIVAL = 20.0  # log likelihood by which one explanation beats another
 CREDIBLE = 12.0  # log likelihood below the best that an interval still holds,
 MISFIT = 0.1  # and share of that of the best: no process is linear
 INFORMATION = 15.0  # least squared length of a signature, in σ
-LIKELY = 8.0  # log likelihood that little friction needs over the trusted one, gains left open
-EPISODES = 3  # least number of separate groups of moves that show a serviced valve
 NEAR = 0.1  # share of f_S within which a friction is the same as before
 NEAR_DYNAMIC = 0.06  # the same for f_D, as a share of f_S
 LOW = 0.1  # share of f_S below which a valve counts as serviced
@@ -36,8 +33,6 @@ WORST = 2.0  # mean square of the innovations that a new friction may leave
 STATIC_SHARES = np.geomspace(0.2, 3.0, 92)  # steps of 3 %
 DYNAMIC_SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5])
 FINE_SHARES = np.geomspace(0.4, 2.5, 185)  # steps of 1 %
-LOW_STATIC = np.linspace(0.0, LOW, 6)
-LOW_DYNAMIC = np.array([0.0, 0.5, 1.0])  # of f_S
 
 
 class ChangeStatus(enum.StrEnum):
@@ -103,15 +98,13 @@ def look_for_change(
     serviced, share = _serviced(rule, evidence, valve)
     grown, near = _grown(evidence, valve, trusted)
     doubted = max(serviced.gain, grown.gain - near) > SUSPICION
-    rival = max(near, serviced.gain + RIVAL, 0.0)
+    rival = max(near, serviced.gain, 0.0)
     if grown.gain - rival > CERTAINTY + MISFIT * grown.gain:
         change = _changed(rule, evidence, valve, grown, trusted)
         if change is not None:
             return change
-    if share is not None and _agrees(rule, share) and serviced.gain > SUSPICION:
-        low, rest = _rivals(evidence, valve, trusted, serviced.first)
-        if low >= LIKELY and rest - max(low, serviced.gain) <= RIVAL:
-            return FrictionChange(ChangeStatus.SERVICED, name, len(evidence.op) - serviced.first)
+    if share is not None and _shows(rule, share) and serviced.gain > SUSPICION:
+        return FrictionChange(ChangeStatus.SERVICED, name, len(evidence.op) - serviced.first)
     explained = evidence.mean_square <= EXPLAINED
     return FrictionChange(ChangeStatus.UNCHANGED, name, doubted=doubted, explained=explained)
 
@@ -144,22 +137,19 @@ def _slack(gain: float) -> float:
     return CREDIBLE + MISFIT * max(gain, 0.0)
 
 
-def _agrees(rule: ChangeRule, share: Share) -> bool:
-    many = share.episodes >= EPISODES and share.moves >= rule.change_moves
-    return many and share.information >= INFORMATION and share.margin >= rule.change_margin
+def _shows(rule: ChangeRule, share: Share) -> bool:
+    return share.information >= INFORMATION and share.margin >= rule.change_margin
 
 
 def _serviced(rule: ChangeRule, evidence: Evidence, valve: int) -> tuple[_Found, Share | None]:
     """Return from when on the valve follows OP most likely, and the share of that."""
-    moves = evidence.moves[valve]
+    moves, op = evidence.moves[valve].tolist(), evidence.op[:, [valve]]
     starts = moves[: max(len(moves) - rule.change_moves + 1, 0)]
-    if not len(starts):
+    gains = [float(evidence.gains(valve, k, op[k:], starts[0])[0][0]) for k in starts]
+    if not gains:
         return _Found(0, 0.0, 0.0, 0.0), None
-    signature = evidence.signature(valve, evidence.op[:, valve])
-    gains = np.cumsum(evidence.gain(signature)[::-1])[::-1]
-    first = int(starts[np.argmax(gains[starts])])
-    found = _Found(first, 0.0, 0.0, float(gains[first]))
-    return found, evidence.share(valve, signature, first)
+    first = starts[int(np.argmax(gains))]
+    return _Found(first, 0.0, 0.0, max(gains)), evidence.share(valve, first, op[first:, 0])
 
 
 def _grown(evidence: Evidence, valve: int, trusted: TrustedFriction) -> tuple[_Found, float]:
@@ -250,12 +240,9 @@ def _changed(
     first = found.first
     best, error = _best(evidence, valve, first, (found.static, found.dynamic))
     _, left = _gains(evidence, valve, first, np.array([best]))
-    stems = evidence.stem[:, valve].copy()
-    stems[first:] = evidence.stems(valve, first, np.array([best]))[:, 0]
-    share = evidence.share(valve, evidence.signature(valve, stems), first)
-    plain = share.margin >= rule.change_margin and share.information >= INFORMATION
+    share = evidence.share(valve, first, evidence.stems(valve, first, np.array([best]))[:, 0])
     low, high = static_interval(evidence, valve, first, best)
-    if not plain or left[0] > WORST or low <= LOW * trusted.static_friction:
+    if not _shows(rule, share) or left[0] > WORST or low <= LOW * trusted.static_friction:
         return None  # the last: perhaps it is serviced, which more moves must show
     new = trusted.narrowed((low, high), best[1], _around(best[1], error), anew=True)
     name = evidence.reference.valves[valve]
@@ -291,17 +278,3 @@ def _refined_dynamic(
 
 def _around(dynamic: float, error: float) -> Interval:
     return max(dynamic - 3.0 * error, 0.0), dynamic + 3.0 * error
-
-
-def _rivals(
-    evidence: Evidence, valve: int, trusted: TrustedFriction, first: int
-) -> tuple[float, float]:
-    """Return the best log likelihoods from ``first`` on of little friction, and of more."""
-    little = np.array([(s, s * d) for s in LOW_STATIC for d in LOW_DYNAMIC])
-    more = np.array([(s, d * s) for s in STATIC_SHARES for d in (0.0, 0.1, 0.25, 0.5, 0.75, 1.0)])
-    gains = [
-        float(_gains(evidence, valve, first, grid * trusted.static_friction)[0].max())
-        for grid in (little, more)
-    ]
-    follows, _ = evidence.gains(valve, first, evidence.op[first:, [valve]])
-    return max(gains[0], float(follows[0])), gains[1]

@@ -195,13 +195,11 @@ def test_a_wide_interval_is_offered_from_below_and_narrowed_by_what_follows() ->
 @given(st.floats(-2.0, 2.0), st.floats(-0.3, 0.3), st.integers(0, 5))
 def test_a_share_is_what_was_put_in_whatever_the_gain(share: float, gain: float, seed: int) -> None:
     seen = evidence(kicks(5.5, 9.0, seed), OLD)
-    signature = seen.signature(0, seen.op[:, 0])
+    signature = seen.signature(0, 0, seen.op)
     centred = seen.stem[:, 0] - seen.stem[:, 0].mean()
     output = REFERENCE.outputs[0]
-    seen.innovations = [share * signature[0] + gain * output.response("V1", centred)]
-    found = seen.share(0, signature, 0)
-    assert found.value == pytest.approx(share, abs=1e-6)
-    assert found.episodes == len(seen.moves[0])
+    seen.innovations = [share * signature[0][:, 0] + gain * output.response("V1", centred)]
+    assert seen.share(0, 0, seen.op[:, 0]).value == pytest.approx(share, abs=1e-6)
 
 
 def test_two_valves_are_told_apart() -> None:
