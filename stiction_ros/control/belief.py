@@ -43,7 +43,8 @@ class ValveBelief:
         self.stem = 0.0
         self._memory: Memory = 0.0
         self._others: list[Memory] = []
-        self._positions: tuple[float, float] = (0.0, 0.0)
+        # lowest and highest stem position that OP so far allows, %
+        self.interval: tuple[float, float] = (0.0, 0.0)
 
     def start(self, op: float, low: float = -np.inf, high: float = np.inf) -> None:
         """Begin with OP at rest at ``op``, %, the stem within f_S of it and in the limits."""
@@ -53,35 +54,30 @@ class ValveBelief:
         self._memory, self.stem = law.rest(op), op
         starts = np.linspace(*ends, STARTS).tolist()
         self._others = [law.step(law.rest(stem), op, 0.0)[0] for stem in starts]
-        self._positions = ends
+        self.interval = ends
 
     def settle(self, stem: float) -> None:
         """Take the stem to be surely at ``stem``, %, with OP at rest there."""
         self._memory, self.stem = self.form.law.rest(stem), stem
-        self._others, self._positions = [], (stem, stem)
+        self._others, self.interval = [], (stem, stem)
 
     def apply_op(self, op: float) -> float:
         """Apply ``op``, %, for one sample and return χ̂, %."""
         law = self.form.law
         self._memory, self.stem = law.step(self._memory, op, 0.0)
         if not self._others:
-            self._positions = (self.stem, self.stem)
+            self.interval = (self.stem, self.stem)
             return self.stem
         moved = [law.step(memory, op, 0.0) for memory in self._others]
         stems = [stem for _, stem in moved] + [self.stem]
-        self._positions = (min(stems), max(stems))
-        sure = self._positions[1] - self._positions[0] <= 1e-9
+        self.interval = (min(stems), max(stems))
+        sure = self.interval[1] - self.interval[0] <= 1e-9
         self._others = [] if sure else [memory for memory, _ in moved]
         return self.stem
 
     def expected(self, op: float) -> float:
         """Return the χ̂, %, that :meth:`apply_op` would bring about; nothing changes."""
         return self.form.law.step(self._memory, op, 0.0)[1]
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Lowest and highest stem position that OP so far allows, %."""
-        return self._positions
 
     @property
     def sure(self) -> bool:
