@@ -121,28 +121,26 @@ class Answering:
         """Return −2 log of the likelihood of stems, shape (N, m), up to a constant."""
         return self._solved(self._products(stems), self.prior)[0]
 
-    def left(self, stems: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    def left(self, stems: FloatArray, weights: FloatArray) -> FloatArray:
         """Return what a past and stems do not tell, shape (N,); 0 where the past is not known.
 
         Args:
             stems: shape (N, m).
-            a: shape (n,).
-            b: shape (m, n).
+            weights: of the equation, shape (q,); its constant and waves are not told.
         """
-        count, first = len(self.pv), self.past
-        out = self.pv.copy()
-        for lag in range(1, self.lags + 1):
-            out[first:] += a[lag - 1] * self.pv[first - lag : count - lag]
-            for j, late in enumerate(self.delay.tolist()):
-                shift = lag + late
-                out[first:] -= b[j, lag - 1] * stems[first - shift : count - shift, j]
-        out[:first] = 0.0
-        return out
+        columns, out = self._columns(stems), self.pv[self.past :].copy()
+        for k in np.arange(len(columns)).reshape(-1, self.lags).T.ravel():  # lag by lag
+            out -= weights[k] * columns[k]
+        return np.append(np.zeros(self.past), out)
+
+    def _columns(self, stems: FloatArray) -> list[FloatArray]:
+        """Return PV and stems at all lags behind the past, shape (N − past,) each."""
+        orders = self.lags, self.lags
+        return arx_columns(self.pv, stems.T, self.delay.tolist(), orders, self.past)
 
     def _products(self, stems: FloatArray) -> "_Products":
-        past, orders, seen = self.past, (self.lags, self.lags), self.pv[self.past :]
-        columns = arx_columns(self.pv, stems.T, self.delay.tolist(), orders, past)
-        table = np.column_stack([*columns, np.ones(len(seen)), self.wave[past:]])
+        seen, wave = self.pv[self.past :], self.wave[self.past :]
+        table = np.column_stack([*self._columns(stems), np.ones(len(seen)), wave])
         return _Products(table.T @ table, table.T @ seen, float(seen @ seen), len(seen))
 
     def _tuned(self, stems: FloatArray) -> "tuple[float, Answering]":

@@ -215,7 +215,7 @@ class RecordedLoop:
                 answer = answering.fit(stems[r].T)
                 weights = answer.mean if r < likeliest else answer.drawn(random)
                 a[r, i], b[r, i] = answer.split(weights)
-                outside[r, i] = answering.left(stems[r].T, a[r, i], b[r, i])
+                outside[r, i] = answering.left(stems[r].T, weights)
         return Draws(frictions, tunings, stems, Equations(a, b, delay, outside), likeliest)
 
     def _losses(self, frictions: FloatArray) -> FloatArray:

@@ -26,7 +26,7 @@ def test_process_and_what_comes_from_outside_are_told_apart(pole: float) -> None
     a, b = answer.split(answer.mean)
     assert a.shape == (LAGS,)
     assert b.shape == (1, LAGS)
-    left = answering.left(stem[:, None], a, b)[answering.past :]
+    left = answering.left(stem[:, None], answer.mean)[answering.past :]
     assert np.corrcoef(left, outside[answering.past :])[0, 1] > 0.95
     response = _response(a, b[0], 20)
     assert response == pytest.approx(_response(np.array([-pole]), np.eye(4)[3] * 0.2, 20), abs=0.1)
