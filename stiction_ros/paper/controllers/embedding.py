@@ -96,8 +96,6 @@ class PrintedEmbeddingMpc(Formulation):
                 return found
         goal, stem = situation.target.stem, situation.stem
         before = situation.op_before
-        if situation.before is None and self._before is not None:
-            before = self._before
         if self.tuning.warm_start is WarmStart.NONE:
             return np.clip(
                 np.tile(before, (self.cost.horizon, 1)), self._limits[:, 0], self._limits[:, 1]
