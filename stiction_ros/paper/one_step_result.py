@@ -181,17 +181,13 @@ def result(
         notes += [f"largest friction tried: {one}" for one in sustained_oscillations(record)]
     if options.output_order is None:
         notes.append(f"orders were not given: n_a = {DEFAULT_ORDER} was taken")
-    low, high = options.delay
     log = SearchLog(
         squared_error=found.squared_error,
         objective=found.squared_error if answer.objective is None else answer.objective,
-        output_order=orders.output,
-        input_order=orders.input,
-        first=orders.first,
         points=answer.points,
-        delays_tried=(high - low + 1) ** (len(record.valves) * len(record.outputs)),
         starts=answer.starts,
     )
+    low, high = options.delay
     notes += [
         f"the delay from valve {valve} to {output.name} is the longest tried; widen --delay"
         for output in outputs

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from typing import Any
 
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.result import Identification
 from stiction_ros.signals.arx_fit import Delays
 
@@ -20,13 +21,18 @@ class SolvedStart:
     objective: float  # (12a) of the programme, squared engineering units
     status: str  # IPOPT's own word
     iterations: int  # of IPOPT
-    feasible: bool  # feasible, stable: whether constraints hold and every A(q) is stable
-    stable: bool
+    feasible: bool  # whether all constraints hold
+    stable: bool | None = None  # whether every A(q) is; None where the programme has none
 
     @property
     def accepted(self) -> bool:
         """Whether it may win: finite, feasible and stable."""
-        return self.feasible and self.stable and math.isfinite(self.objective)
+        return self.feasible and bool(self.stable) and math.isfinite(self.objective)
+
+
+def pairs(friction: FloatArray) -> tuple[tuple[float, float], ...]:
+    """Return rows (f_S, f_D), shape (m, 2), as plain numbers."""
+    return tuple((float(static), float(dynamic)) for static, dynamic in friction)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,11 +43,7 @@ class SearchLog:
     # squared engineering units
     squared_error: float
     objective: float  # what the method itself minimised, same units
-    output_order: int  # output_order, input_order, first: n_a, n_b and ε of both
-    input_order: int
-    first: int
     points: int  # grid points, or frictions at which the programme evaluated (12a)
-    delays_tried: int  # number of choices of delays
     starts: tuple[SolvedStart, ...] = ()  # starts of the nonlinear programme, in order
 
     @property

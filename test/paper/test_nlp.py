@@ -72,7 +72,7 @@ def test_squared_error_is_that_of_he_s_law(found: Identification) -> None:
     log, valve = found.search, found.valves[0]
     assert log is not None
     friction = np.array([[valve.static_friction, valve.dynamic_friction]])
-    orders = ArxOrders(log.output_order, log.input_order, log.first)
+    orders = ArxOrders.over(3, 3, [5])
     stems = smooth_law("he").hard_stems(short().op, friction)
     assert log.squared_error == fit_outputs(short().pv, stems, ((5,),), orders).squared_error
     assert log.objective == pytest.approx(log.squared_error, rel=0.05)
@@ -131,8 +131,8 @@ def test_a_run_never_ends_worse_than_it_began(start: tuple[float, float]) -> Non
     criterion = Criterion(StemTable(record, limits, ArxOrders.over(3, 3, [5])), ((5,),))
     end = ReducedProgramme(criterion).solve(np.array([start]), 0.05)
     assert end.objective <= criterion(np.array([start]))[0]
-    assert end.objective == pytest.approx(criterion(end.friction)[0], rel=1e-6)
-    ((static, dynamic),) = end.friction
+    assert end.objective == pytest.approx(criterion(np.array(end.end))[0], rel=1e-6)
+    ((static, dynamic),) = end.end
     assert 0.0 <= dynamic <= static <= limits[0]
 
 

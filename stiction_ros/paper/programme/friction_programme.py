@@ -21,7 +21,8 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper.one_step_result import EquationError, fit_outputs
 from stiction_ros.paper.programme.programme_data import Frame, ProgrammeData
-from stiction_ros.paper.programme.reduced_programme import ALPHA, Solution
+from stiction_ros.paper.programme.reduced_programme import ALPHA
+from stiction_ros.paper.search_log import SolvedStart, pairs
 from stiction_ros.signals.arx_fit import Delays
 
 FEASIBILITY = 1e-6
@@ -76,14 +77,24 @@ class FrictionProgramme:
             x[place + free] = part
         return x, found
 
-    def solve(self, x: FloatArray, smoothing: FloatArray) -> Solution:
-        """Run IPOPT once from ``x``, then solve the coefficients with the frictions held."""
+    def solve(
+        self, start: FloatArray, smoothing: FloatArray, x: FloatArray | None = None
+    ) -> SolvedStart:
+        """Run IPOPT once from frictions, then solve the coefficients with the frictions held.
+
+        The unknowns ``x`` are those of the start (15) unless given.
+        """
         count = 2 * self.frame.valves
         low, high = np.full(self.frame.size, -np.inf), np.full(self.frame.size, np.inf)
         low[:count], high[:count] = 0.0, np.repeat(self.data.limit / self.data.op_span, 2)
         low[self.frame.held], high[self.frame.held] = 0.0, 0.0
         answer = self._solver(
-            x0=x, p=smoothing * self.data.op_span, lbx=low, ubx=high, lbg=0.0, ubg=np.inf
+            x0=self.start(start) if x is None else x,
+            p=smoothing * self.data.op_span,
+            lbx=low,
+            ubx=high,
+            lbg=0.0,
+            ubg=np.inf,
         )
         stats = self._solver.stats()
         end = np.array(answer["x"]).ravel()
@@ -95,8 +106,10 @@ class FrictionProgramme:
             objective = float(np.fmin(objective, found.squared_error))
             stable = max(fit.largest_root for fit in found.fits) < 1.0
         finite = bool(np.isfinite(end).all() and np.isfinite(slack).all())
-        return Solution(
-            friction=friction,
+        return SolvedStart(
+            delays=self.delays,
+            start=pairs(start),
+            end=pairs(friction),
             objective=objective,
             status=str(stats["return_status"]),
             iterations=int(stats["iter_count"]),

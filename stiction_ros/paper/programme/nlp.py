@@ -11,6 +11,7 @@ of T choices of delays are spent:
 The best objective of a stable process wins.
 """
 
+import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -20,12 +21,7 @@ from stiction_ros.paper import one_step_result as one_step
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme
 from stiction_ros.paper.programme.programme_data import ProgrammeData
-from stiction_ros.paper.programme.reduced_programme import (
-    Criterion,
-    ReducedProgramme,
-    Solution,
-    StemTable,
-)
+from stiction_ros.paper.programme.reduced_programme import Criterion, ReducedProgramme, StemTable
 from stiction_ros.paper.programme.starts import apparent_stictions, around, candidates, draw_starts
 from stiction_ros.paper.search_log import SolvedStart
 from stiction_ros.paper.smoothed_laws import final_smoothing
@@ -142,11 +138,12 @@ class _Search:
 
     def _solve(self, start: FloatArray, delays: Delays, width: float) -> None:
         start = self._released(start, self.programmes[delays].criterion)
-        solution = self.programmes[delays].solve(start, width)
-        fits = one_step.evaluated(self.record, self.options, solution.friction, delays).fits
+        solved = self.programmes[delays].solve(start, width)
+        end = np.array(solved.end)
+        fits = one_step.evaluated(self.record, self.options, end, delays).fits
         stable = max(fit.largest_root for fit in fits) < 1.0
-        self._tried[delays] += [start, solution.friction]
-        self.log.append(solved(start, delays, solution, stable))
+        self._tried[delays] += [start, end]
+        self.log.append(dataclasses.replace(solved, stable=stable))
         self.progress(min(1.0, len(self.log) / self.budget))
 
     def _released(self, friction: FloatArray, criterion: Criterion) -> FloatArray:
@@ -157,24 +154,6 @@ class _Search:
             if criterion(released)[0] < criterion(friction)[0]:
                 friction = released
         return friction
-
-
-def solved(start: FloatArray, delays: Delays, end: Solution, stable: bool) -> SolvedStart:
-    """Return what one run of IPOPT came to, in plain numbers."""
-    begun, ended = (
-        tuple((float(static), float(dynamic)) for static, dynamic in friction)
-        for friction in (start, end.friction)
-    )
-    return SolvedStart(
-        delays=delays,
-        start=begun,
-        end=ended,
-        objective=end.objective,
-        status=end.status,
-        iterations=end.iterations,
-        feasible=end.feasible,
-        stable=stable,
-    )
 
 
 def best_of(log: Sequence[SolvedStart]) -> SolvedStart | None:
@@ -200,8 +179,7 @@ def search_as_printed(
     for delays in choices:
         programme = FrictionProgramme(data, delays)
         for start in starts:
-            end = programme.solve(programme.start(start), smoothing)
-            log.append(solved(start, delays, end, bool(end.stable)))
+            log.append(programme.solve(start, smoothing))
             progress(len(log) / (len(choices) * len(starts)))
     accepted = best_of(log)
     best = accepted or min(log, key=lambda one: one.objective)

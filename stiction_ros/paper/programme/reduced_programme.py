@@ -8,7 +8,6 @@ V is piecewise constant in f_S at τ = 10⁴, so IPOPT is given the slope of V a
 that shrinks. The best point that was evaluated is the answer.
 """
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -16,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.paper.search_log import SolvedStart, pairs
 from stiction_ros.paper.smoothed_laws import final_smoothing, smooth_law
 from stiction_ros.records import Record
 from stiction_ros.signals.arx import lagged
@@ -136,20 +136,6 @@ class Criterion:
         return float(rest @ rest - 2.0 * theta @ right + theta @ gram @ theta)
 
 
-@dataclasses.dataclass(frozen=True)
-class Solution:
-    """Where one run of IPOPT came to; a failure is a value."""
-
-    friction: FloatArray  # rows (f_S, f_D), shape (m, 2), %
-    objective: float  # (12a), squared engineering units
-    status: str  # IPOPT's own word
-    iterations: int  # of IPOPT
-    feasible: bool  # whether all constraints hold
-    # whether every identified A(q) has its roots inside the unit circle; None where the programme
-    # has none
-    stable: bool | None = None
-
-
 class ReducedProgramme:
     """The programme for one choice of delays; one solver serves every start."""
 
@@ -162,7 +148,7 @@ class ReducedProgramme:
         self._callbacks: list[_Called] = []
         self._solver = self._build()
 
-    def solve(self, friction: FloatArray, width: float) -> Solution:
+    def solve(self, friction: FloatArray, width: float) -> SolvedStart:
         """Run IPOPT once from rows (f_S, f_D), shape (m, 2), %; ``width`` is a share of f_max.
 
         The best feasible point that was evaluated is returned, or the start where none was.
@@ -175,10 +161,16 @@ class ReducedProgramme:
         self._solver(x0=x, lbx=0.0, ubx=high, lbg=0.0, ubg=np.inf)
         stats = self._solver.stats()
         status, iterations = str(stats["return_status"]), int(stats["iter_count"])
-        if self._best is None:
-            return Solution(np.asarray(friction), float("inf"), status, iterations, feasible=False)
-        value, found = self._best
-        return Solution(found, value, status, iterations, feasible=bool(np.isfinite(value)))
+        value, found = (float("inf"), friction) if self._best is None else self._best
+        return SolvedStart(
+            self.criterion.delays,
+            pairs(friction),
+            pairs(found),
+            value,
+            status,
+            iterations,
+            feasible=bool(np.isfinite(value)),
+        )
 
     def _friction(self, x: FloatArray) -> FloatArray:
         """Return rows (f_S, f_D), shape (m, 2), %, of (J, S) of every valve over f_max."""

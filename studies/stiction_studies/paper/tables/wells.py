@@ -60,8 +60,8 @@ class _Well:
             start[0] += apart * np.array([np.cos(angle), np.sin(angle)])
             x, found = self.joint.fitted(start, smoothing)
             begun.append(found.squared_error)
-            joint.append(self.joint.solve(x, smoothing).friction)
-            reduced.append(self.reduced.solve(start, WIDTH).friction)
+            joint.append(np.array(self.joint.solve(start, smoothing, x).end))
+            reduced.append(np.array(self.reduced.solve(start, WIDTH).end))
         least = self.criterion(self.truth)[0]
         return Row(
             f"Example {self.number}, starts {apart:g} % off",
