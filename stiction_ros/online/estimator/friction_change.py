@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.online.estimator.change_evidence import START_ROWS, Evidence, Share
+from stiction_ros.online.estimator.change_evidence import START_ROWS, Evidence
 from stiction_ros.online.estimator.trust import Interval, TrustedFriction
 from stiction_ros.settings import setting
 
@@ -91,20 +91,17 @@ def look_for_change(
     rule: ChangeRule, evidence: Evidence, valve: int, trusted: TrustedFriction
 ) -> FrictionChange:
     """Return what the window says of the friction of ``valve``, an index."""
-    name = evidence.reference.valves[valve]
-    if not rule.change_moves or not len(evidence.moves[valve]):
-        explained = evidence.mean_square <= EXPLAINED
-        return FrictionChange(ChangeStatus.UNCHANGED, name, explained=explained)
-    serviced, share = _serviced(rule, evidence, valve)
+    name, op = evidence.reference.valves[valve], evidence.op[:, valve]
+    serviced, since = _serviced(rule, evidence, valve)
     grown, near = _grown(evidence, valve, trusted)
-    doubted = max(serviced.gain, grown.gain - near) > SUSPICION
-    rival = max(near, serviced.gain, 0.0)
+    doubted = max(serviced, grown.gain - near) > SUSPICION
+    rival = max(near, serviced, 0.0)
     if grown.gain - rival > CERTAINTY + MISFIT * grown.gain:
         change = _changed(rule, evidence, valve, grown, trusted)
         if change is not None:
             return change
-    if share is not None and _shows(rule, share) and serviced.gain > SUSPICION:
-        return FrictionChange(ChangeStatus.SERVICED, name, len(evidence.op) - serviced.first)
+    if serviced > SUSPICION and _shows(rule, evidence, valve, since, op[since:]):
+        return FrictionChange(ChangeStatus.SERVICED, name, len(op) - since)
     explained = evidence.mean_square <= EXPLAINED
     return FrictionChange(ChangeStatus.UNCHANGED, name, doubted=doubted, explained=explained)
 
@@ -137,19 +134,21 @@ def _slack(gain: float) -> float:
     return CREDIBLE + MISFIT * max(gain, 0.0)
 
 
-def _shows(rule: ChangeRule, share: Share) -> bool:
+def _shows(rule: ChangeRule, evidence: Evidence, valve: int, first: int, stems: FloatArray) -> bool:
+    """Return whether PV shows other stems from ``first`` on, (n − first,), %, by enough."""
+    share = evidence.share(valve, first, stems)
     return share.information >= INFORMATION and share.margin >= rule.change_margin
 
 
-def _serviced(rule: ChangeRule, evidence: Evidence, valve: int) -> tuple[_Found, Share | None]:
-    """Return from when on the valve follows OP most likely, and the share of that."""
+def _serviced(rule: ChangeRule, evidence: Evidence, valve: int) -> tuple[float, int]:
+    """Return the largest log likelihood of a valve that follows OP, and from when on it does."""
     moves, op = evidence.moves[valve].tolist(), evidence.op[:, [valve]]
     starts = moves[: max(len(moves) - rule.change_moves + 1, 0)]
     gains = [float(evidence.gains(valve, k, op[k:], starts[0])[0][0]) for k in starts]
     if not gains:
-        return _Found(0, 0.0, 0.0, 0.0), None
-    first = starts[int(np.argmax(gains))]
-    return _Found(first, 0.0, 0.0, max(gains)), evidence.share(valve, first, op[first:, 0])
+        return 0.0, 0
+    best = int(np.argmax(gains))
+    return gains[best], starts[best]
 
 
 def _grown(evidence: Evidence, valve: int, trusted: TrustedFriction) -> tuple[_Found, float]:
@@ -240,9 +239,13 @@ def _changed(
     first = found.first
     best, error = _best(evidence, valve, first, (found.static, found.dynamic))
     _, left = _gains(evidence, valve, first, np.array([best]))
-    share = evidence.share(valve, first, evidence.stems(valve, first, np.array([best]))[:, 0])
+    stems = evidence.stems(valve, first, np.array([best]))[:, 0]
     low, high = static_interval(evidence, valve, first, best)
-    if not _shows(rule, share) or left[0] > WORST or low <= LOW * trusted.static_friction:
+    if (
+        not _shows(rule, evidence, valve, first, stems)
+        or left[0] > WORST
+        or low <= LOW * trusted.static_friction
+    ):
         return None  # the last: perhaps it is serviced, which more moves must show
     new = trusted.narrowed((low, high), best[1], _around(best[1], error), anew=True)
     name = evidence.reference.valves[valve]

@@ -118,12 +118,6 @@ def test_a_few_moves_are_not_enough() -> None:
     assert found.status is ChangeStatus.UNCHANGED
 
 
-def test_nobody_looks_where_no_moves_are_asked_for() -> None:
-    assert look(evidence(kicks(5.5, 9.0), None), ChangeRule(change_moves=0)).status is (
-        ChangeStatus.UNCHANGED
-    )
-
-
 @pytest.mark.parametrize(
     ("new", "op", "widest"),
     [
