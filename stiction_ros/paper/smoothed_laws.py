@@ -16,6 +16,7 @@ from stiction_ros.compiled import compiled
 from stiction_ros.effects import HeStiction, KanoStiction, SemiPhysicalStiction, XchStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.identification.friction import simulate
 
 OVERSHOOT = 1.99  # K of the semi-physical law, as published
 SMOOTHING = 1e4
@@ -118,14 +119,9 @@ class SmoothLaw:
     def hard_stems(self, op: FloatArray, friction: FloatArray) -> FloatArray:
         """Return stems of the hard law, shape (m, N), %; arguments as of :meth:`stems`."""
         static = np.maximum(friction[:, 0], 0.0)
-        rows = self.kind.rows_of_frictions(
-            np.column_stack([static, np.clip(friction[:, 1], 0.0, static)])
-        )
-        stems = [
-            self.kind.simulate_grid(row[None, :], u, float(u[0]))[:, 0]
-            for u, row in zip(op.T, rows, strict=True)
-        ]
-        return np.array(stems)
+        rows = np.column_stack([static, np.clip(friction[:, 1], 0.0, static)])
+        moved = zip(op.T, rows, strict=True)
+        return np.array([simulate(self.kind, row[None], u, float(u[0]))[:, 0] for u, row in moved])
 
 
 def smooth_law(name: str) -> SmoothLaw:
