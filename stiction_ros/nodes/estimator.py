@@ -21,7 +21,7 @@ from stiction_ros.online.loop_estimator import EstimatorNodeSettings, Fit, Keys,
 from stiction_ros.online.monitor.gap_finding import GapFinding
 from stiction_ros.online.monitor.gap_monitor import GapMonitor
 
-COUNTED = ("bridged", "repeated", "stale", "future")
+COUNTED = ("repeated", "stale", "future")
 SHOWN_AGAIN = 3.0  # s: a plant in lockstep shows its sample each second
 FIGURES = ("gap", "baseline", "growth", "limit")  # of an output
 
@@ -137,7 +137,7 @@ class EstimatorNode(ManagedNode):
                     self._model.publish(String(data=one.model_text))
                 self._stiction.publish(friction_message(one.stamp, one.token, one.rows))
                 if one.update is None:
-                    self._failed += one.error is not None
+                    self._failed += 1
                     self._said = one.failure
                     continue
                 self._fits += 1

@@ -28,8 +28,7 @@ class LoopWindow:
     """The last samples of one loop, paired as the estimator pairs them.
 
     Attributes:
-        samples: taken in, bad ones included.
-        missed: that never came.
+        samples: up to now, with those that are bad or never came.
     """
 
     def __init__(self, name: str, sample_time: float, window: int) -> None:
@@ -39,7 +38,7 @@ class LoopWindow:
         self._window: deque[PairedSample] = deque(maxlen=window)
         self._valves: tuple[str, ...] = ()
         self._outputs: tuple[str, ...] = ()
-        self.samples = self.missed = 0
+        self.samples = 0
 
     def add_pv(self, stamp: int, outputs: Sequence[str], pv: FloatArray) -> None:
         """Take in a PV, stamp in ns."""
@@ -62,12 +61,8 @@ class LoopWindow:
         return len(self._window)
 
     def record(self) -> Record | None:
-        """Return the samples behind the last gap as a record; None for fewer than two."""
-        rows = list(self._window)
-        for i in range(len(rows) - 1, 0, -1):
-            if rows[i].begins or rows[i].sample != rows[i - 1].sample + 1:
-                rows = rows[i:]
-                break
+        """Return the samples as a record; None for fewer than two."""
+        rows = self._window
         if len(rows) < 2:
             return None
         pv = np.array([row.pv for row in rows])
@@ -87,8 +82,9 @@ class LoopWindow:
 
     def _keep(self, found: Sequence[PairedSample]) -> None:
         for one in found:
+            if one.begins:
+                self._window.clear()
             self.samples += 1
-            self.missed += one.missed
             self._window.append(one)
 
 

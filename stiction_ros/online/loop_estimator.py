@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any
 
-import numpy as np
-
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
 from stiction_ros.loop import LoopModel
@@ -17,7 +15,7 @@ from stiction_ros.online.health import Notice
 from stiction_ros.online.input.samples import picked
 from stiction_ros.online.monitor.gap_finding import GapFinding
 from stiction_ros.online.monitor.gap_monitor import GapLook, GapMonitor, MonitorRule
-from stiction_ros.online.pairing import BRIDGED, NEW_RUN, PairedSample, Pairing
+from stiction_ros.online.pairing import NEW_RUN, PairedSample, Pairing
 from stiction_ros.online.plain_settings import PacedSettings
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
@@ -35,7 +33,7 @@ class Fit:
     stamp: int  # its time, ns
     token: str  # ``valid_from`` of the loop model in force after it, as text
     update: FitUpdate | None = None  # what the fit says; None when the window was not usable
-    error: Exception | None = None  # why it was not usable; None also where samples are missing
+    error: Exception | None = None  # why it was not usable
     model_text: str = ""  # YAML of the loop model that it publishes, or empty
 
     @property
@@ -54,8 +52,6 @@ class Fit:
         """Why the window was not usable; empty where it was."""
         if self.update is not None:
             return ""
-        if self.error is None:
-            return "samples are missing"
         said = str(self.error) if isinstance(self.error, InputError) else repr(self.error)
         return f"window not usable: {said}"
 
@@ -71,14 +67,6 @@ class EstimatorNodeSettings(EstimatorSettings, MonitorRule, PacedSettings):
         "loop model file the monitor compares with; empty for the loop as it is identified",
         fixed=True,
     )
-
-    def pairing(self) -> Pairing:
-        """Return what pairs PV and OP; no bridge is longer than what a fit can wait for."""
-        return Pairing(self.sample_time, *self.bridges())
-
-    def bridges(self) -> tuple[int, int]:
-        """Return window and longest bridge of the pairing, samples."""
-        return self.window, min(BRIDGED, self.fit_latency - 1)
 
 
 Told = Notice | Fit | GapLook | GapFinding
@@ -119,7 +107,7 @@ class LoopEstimator:
         self._begin()
 
     def _begin(self) -> None:
-        self.pairs = self.settings.pairing()
+        self.pairs = Pairing(self.settings.sample_time)
         self.live: LiveEstimator | None = None
         self.monitor: GapMonitor | None = None
         self.tags: dict[str, tuple[str, ...]] = {"pv": (), "op": ()}
@@ -131,7 +119,6 @@ class LoopEstimator:
         """Change settings from the next sample on."""
         settings.options()
         self.settings = settings
-        self.pairs.retune(*settings.bridges())
         if self.live is not None and self.monitor is not None:
             self.live.retune(settings)
             self.monitor.retune(settings)
@@ -176,32 +163,21 @@ class LoopEstimator:
             self.monitor = GapMonitor(settings, *loop, self._watched, self._submit)
             self.first = found.sample
         told: list[Told] = []
-        if found.missed or found.begins:
+        if found.begins:
             self.live.restart()
             self.monitor.restart()
-            told += self._skipped(found)
-        elif not np.isfinite(found.pv).all():
-            text = f"bad samples from {found.sample} on, window anew"
-            told.append(Notice("missed", "warn", text))
+            told.append(Notice("run", "warn", f"a new run begins at stamp {found.stamp} ns"))
         self.stamp, self.samples = found.stamp, found.sample + 1
         record = self.live.add(found.sample, found.op, found.pv)
+        if not len(self.live.window):
+            text = f"too many samples lack up to {found.sample}, window anew"
+            told.append(Notice("missed", "warn", text))
         if record is not None:
             future = self._submit(fit, record, self.live.options())
             self._pending.append((found.sample, record, future))
             told += self.collect()
         look = self.monitor.add(found.sample, found.op, found.pv)
         return [*told, *([] if look is None else [look]), *self.collect()]
-
-    def _skipped(self, found: PairedSample) -> list[Told]:
-        """Return what is told of samples that never came: no window may hold them."""
-        told: list[Told] = []
-        if found.begins:
-            told.append(Notice("run", "warn", f"a new run begins at stamp {found.stamp} ns"))
-        if found.missed:
-            text = f"{found.missed} samples missed before sample {found.sample}, window anew"
-            told.append(Notice("missed", "warn", text))
-        lost = filter(self.settings.due, range(found.sample - found.missed, found.sample))
-        return told + [Fit(sample, self.pairs.stamp_of(sample), self.token) for sample in lost]
 
     # ---- fits out --------------------------------------------------------------------------
 

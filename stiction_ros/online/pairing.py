@@ -12,8 +12,6 @@ UNPAIRED = 5000  # samples of PV kept while their OP is missing
 FAR = 100  # samples ahead: a stamp beyond is another clock, not a gap
 SILENT = 20  # PVs without op_applied after which op counts again
 NEW_RUN = 10  # rising stamps in succession, all too old or too far ahead, are a new run
-BRIDGED = 3  # samples in succession
-BRIDGED_SHARE = 0.01  # of the window
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,10 +20,8 @@ class PairedSample:
 
     sample: int  # number, counted from the first PV, on and on when a new run begins
     stamp: int  # ns
-    op: FloatArray  # op, pv: shapes (m,) and (p,); PV is NaN at a bad sample that is not bridged
-    pv: FloatArray
-    missed: int = 0  # samples before it that never came and are not bridged
-    bridged: bool = False  # whether PV is interpolated, as its own was missing or not finite
+    op: FloatArray  # shape (m,)
+    pv: FloatArray  # shape (p,); NaN where it never came
     begins: bool = False  # whether a new run begins with it
 
 
@@ -37,21 +33,17 @@ class Pairing:
       never came (a later one did) takes the OP before it, which was held.
     - A stamp that was there already, that is older or more than ``FAR`` samples ahead is left
       out. ``NEW_RUN`` of these in succession that rise are a new run; a single one does nothing.
-    - Up to ``longest`` samples in succession, and not more than 1 % of the window, whose PV is
-      missing or not finite are bridged: PV linear between its neighbours, OP as given or held.
-      More are left out: the window begins anew behind them.
+    - A sample whose PV never came has none, and its OP as given or held.
 
     Attributes:
         origin: stamp of sample 0 of the present run, ns; None before the first PV.
-        counts: of samples that were ``bridged``, ``missed`` or ``bad`` (not finite, not
-            bridged), and of PVs that were ``repeated``, ``stale`` or ``future``; of ``runs``
-            that began anew.
+        counts: of samples that were ``missed`` or ``bad`` (not finite), and of PVs that were
+            ``repeated``, ``stale`` or ``future``; of ``runs`` that began anew.
     """
 
-    def __init__(self, sample_time: float, window: int = 0, longest: int = BRIDGED) -> None:
-        """Start empty; ``sample_time`` in seconds, ``window`` in samples (0 bridges nothing)."""
+    def __init__(self, sample_time: float) -> None:
+        """Start empty; ``sample_time`` in seconds."""
         self._step = round(sample_time * 1e9)
-        self._window, self._longest = window, longest
         self._pv: dict[int, FloatArray] = {}
         self._op: dict[int, FloatArray] = {}
         self._past: deque[tuple[int, FloatArray]] = deque(maxlen=2 * FAR)  # used OPs, rising
@@ -61,17 +53,10 @@ class Pairing:
         self._last: int | None = None
         self._strays: list[tuple[int, FloatArray]] = []
         self._begins = False
-        self._next = 0
-        self._gap: list[PairedSample] = []
-        self._good: PairedSample | None = None
-        self._bridges: deque[int] = deque()
+        self._next: int | None = None  # number of the next sample; None before the first
         self._earlier: list[tuple[int, int]] = []  # end (a sample) and origin of earlier runs
         self.origin: int | None = None
         self.counts: Counter[str] = Counter()
-
-    def retune(self, window: int, longest: int) -> None:
-        """Bridge as for this ``window`` from the next sample on."""
-        self._window, self._longest = window, longest
 
     @property
     def behind(self) -> int:
@@ -137,20 +122,20 @@ class Pairing:
 
     def _begin_anew(self) -> list[PairedSample]:
         """Take the stamps that were left out for those of a new run; sample numbers go on."""
-        done, strays = self._close_gap(), self._strays
+        strays, number = self._strays, self._next or 0
         first, last = strays[0][0], strays[-1][0]
         if self.origin is not None:
-            self._earlier.append((self._next, self.origin))
-        self.origin = first - self._next * self._step
+            self._earlier.append((number, self.origin))
+        self.origin = first - number * self._step
         self.counts["runs"] += 1
-        self._begins, self._good, self._strays = True, None, []
+        self._begins, self._strays = True, []
         self._past.clear()
         self._pv.clear()
         early, late = first - 2 * self._step, last + FAR * self._step
         self._op = {sent: value for sent, value in self._op.items() if early < sent < late}
         for stamp, pv in strays:
             self._accept(stamp, pv)
-        return done + self._complete()
+        return self._complete()
 
     def _complete(self) -> list[PairedSample]:
         done: list[PairedSample] = []
@@ -161,13 +146,26 @@ class Pairing:
             if not own and not any(stamp < sent <= self._last + half for sent in self._op):
                 break  # its OP may still come
             pv = self._pv.pop(stamp)
-            known = any(np.isfinite(self._op[sent]).all() for sent in own) or not own
             self._put_by(stamp + half)
             op = self._op_at(stamp)
             sample = (stamp - self.origin + half) // self._step
-            if op is not None and sample >= self._expected:
-                done += self._bridge(PairedSample(sample, stamp, op, pv), known)
+            first = sample if self._next is None or self._begins else self._next
+            if op is None or sample < first:
+                continue
+            if sample - first > FAR:  # stamps of a new run need not follow each other closely
+                first, self._begins = sample, True
+            done += [self._lacking(number, op, pv) for number in range(first, sample)]
+            done.append(PairedSample(sample, stamp, op, pv, self._begins))
+            self.counts["missed"] += sample - first
+            self.counts["bad"] += not np.isfinite(pv).all()
+            self._next, self._begins = sample + 1, False
         return done
+
+    def _lacking(self, sample: int, op: FloatArray, pv: FloatArray) -> PairedSample:
+        """Return a sample whose PV never came; ``op`` and ``pv`` are the first behind it."""
+        stamp = self.stamp_of(sample)
+        given = self._op_at(stamp)
+        return PairedSample(sample, stamp, op if given is None else given, np.full_like(pv, np.nan))
 
     def _put_by(self, end: int) -> None:
         """Move the OPs up to ``end`` to those that have been used; a stale one is forgotten."""
@@ -180,63 +178,3 @@ class Pairing:
         """Return the OP in force at a stamp, the last one up to it."""
         end = stamp + self._step // 2
         return next((op for sent, op in reversed(self._past) if sent <= end), None)
-
-    # ---- bridges ---------------------------------------------------------------------------
-
-    @property
-    def _expected(self) -> int:
-        return self._gap[-1].sample + 1 if self._gap else self._next
-
-    def _bridge(self, found: PairedSample, known: bool) -> list[PairedSample]:
-        """Return what is complete now that ``found`` is there; its OP may not be ``known``."""
-        lacking = range(self._expected, found.sample)
-        may = self._window and self._good is not None
-        done: list[PairedSample] = []
-        if may and len(lacking) + len(self._gap) <= self._longest:
-            self._gap += [self._lacking(number, found) for number in lacking]
-        elif lacking:
-            done += self._close_gap()
-            self.counts["missed"] += len(lacking)
-            found = dataclasses.replace(found, missed=len(lacking))
-        found = dataclasses.replace(found, begins=self._begins)
-        self._begins = False
-        if not (known and np.isfinite(found.pv).all()):
-            self._gap.append(found)
-            if self._good is None or len(self._gap) > self._longest or not self._window:
-                done += self._close_gap()
-            return done
-        if self._gap and not self._room(found.sample):
-            done += self._close_gap()
-        for one in self._gap:
-            self._bridges.append(one.sample)
-            done.append(self._interpolated(one, found))
-        self.counts["bridged"] += len(self._gap)
-        self._gap, self._good, self._next = [], found, found.sample + 1
-        return [*done, found]
-
-    def _lacking(self, sample: int, after: PairedSample) -> PairedSample:
-        """Return a sample whose PV never came, with its OP as far as that is known."""
-        stamp = self.stamp_of(sample)
-        op = self._op_at(stamp)
-        nothing = np.full_like(after.pv, np.nan)
-        return PairedSample(sample, stamp, after.op if op is None else op, nothing)
-
-    def _close_gap(self) -> list[PairedSample]:
-        """Give up what waits to be bridged: bad samples come out without a PV."""
-        done = [dataclasses.replace(one, pv=np.full_like(one.pv, np.nan)) for one in self._gap]
-        self.counts["bad"] += len(done)
-        self._next, self._gap, self._good = self._expected, [], None
-        return done
-
-    def _room(self, sample: int) -> bool:
-        """Return whether the window may hold the bridges of the present gap as well."""
-        while self._bridges and self._bridges[0] <= sample - self._window:
-            self._bridges.popleft()
-        return len(self._bridges) + len(self._gap) <= BRIDGED_SHARE * self._window
-
-    def _interpolated(self, one: PairedSample, after: PairedSample) -> PairedSample:
-        assert self._good is not None
-        share = (one.sample - self._good.sample) / (after.sample - self._good.sample)
-        line = self._good.pv + share * (after.pv - self._good.pv)
-        pv = np.where(np.isfinite(one.pv), one.pv, line)
-        return dataclasses.replace(one, pv=pv, bridged=True)

@@ -77,12 +77,12 @@ class Loop:
         self.graph.spin_until(said, text)
 
 
-def test_a_few_missed_samples_are_bridged_and_counted(graph: Graph) -> None:
+def test_a_few_missed_samples_are_filled_and_counted(graph: Graph) -> None:
     loop = Loop(graph)
-    loop.show([1, 2, 3, 6, 7])
-    loop.until(7)
-    assert loop.node.estimator.pairs.counts["bridged"] == 2
-    assert len(loop.node.estimator.live._pv) == 7
+    loop.show([*range(1, 41), *range(43, 51)])
+    loop.until(50)
+    assert loop.node.estimator.pairs.counts["missed"] == 2
+    assert len(loop.node.estimator.live.window) == 50
 
 
 @pytest.mark.parametrize("how", ["lost", "nan"])
@@ -93,7 +93,7 @@ def test_many_missed_samples_begin_the_window_anew(graph: Graph, how: str) -> No
         loop.show(range(4, 10), float("nan"))
     loop.show([10, 11])
     loop.until(11)
-    assert len(loop.node.estimator.live._pv) == 2
+    assert len(loop.node.estimator.live.window) == 2
     loop.says(b"\x01", "window anew")
     graph.spin_until(lambda: loop.told[-1][2]["missed_samples"] == "6", "the count")
 
@@ -104,10 +104,10 @@ def test_one_stale_or_future_stamp_does_nothing_and_ten_older_ones_are_a_new_run
     loop = Loop(graph)
     loop.show([1000, 1001, 1002, 5, 10**6, 1003])
     loop.until(4)
-    assert len(loop.node.estimator.live._pv) == 4
+    assert len(loop.node.estimator.live.window) == 4
     loop.show(range(1, 13))
     loop.until(16)
-    assert len(loop.node.estimator.live._pv) == 12
+    assert len(loop.node.estimator.live.window) == 12
     assert loop.node.estimator.pairs.counts["runs"] == 1
 
 
@@ -133,7 +133,7 @@ def test_a_stray_that_came_first_does_not_name_the_tags_for_ever(graph: Graph) -
     loop.show(range(2, 30))
     graph.spin_until(lambda: loop.node.estimator.tags["pv"] == ("PV1",), "the true tag")
     graph.spin_until(
-        lambda: loop.node.estimator.live and len(loop.node.estimator.live._pv) > 10, "samples"
+        lambda: loop.node.estimator.live and len(loop.node.estimator.live.window) > 10, "samples"
     )
 
 
@@ -170,4 +170,4 @@ def test_a_sample_that_is_shown_again_counts_once(graph: Graph) -> None:
     loop.show([1, 2, 2, 2, 3])
     loop.until(3)
     assert loop.node.estimator.pairs.counts["repeated"] == 2
-    assert len(loop.node.estimator.live._pv) == 3
+    assert len(loop.node.estimator.live.window) == 3

@@ -37,7 +37,8 @@ def test_in_order_streams_lose_nothing(orders):
             first, second = second, first
         found += first(k * SECOND, value(k)) + second(k * SECOND, value(k))
     assert [s.sample for s in found] == list(range(len(orders) + 1))
-    assert all(s.op == s.pv == s.sample and s.missed == 0 for s in found)
+    assert all(s.op == s.pv == s.sample for s in found)
+    assert not +pairing.counts
 
 
 def test_a_pv_without_op_takes_the_op_that_was_held():
@@ -50,13 +51,13 @@ def test_a_pv_without_op_takes_the_op_that_was_held():
     assert [(s.sample, float(s.op[0])) for s in found] == [(1, 7.0), (2, 9.0)]
 
 
-def test_missed_samples_are_counted():
+def test_samples_before_the_first_pv_of_a_run_are_not_missed():
     pairing = Pairing(1.0)
-    pairing.add_pv(0, value(0))
-    pairing.add_op(0, value(0))
+    pairing.origin = 0
     pairing.add_pv(4 * SECOND, value(4))
     (found,) = pairing.add_op(4 * SECOND, value(4))
-    assert (found.sample, found.missed) == (4, 3)
+    assert found.sample == 4
+    assert not +pairing.counts
 
 
 def test_pv_alone_does_not_pile_up():
@@ -91,8 +92,6 @@ def test_the_op_before_the_run_holds_until_another_is_applied():
 
 # ---- streams with faults, as a table -----------------------------------------------------------
 
-WINDOW = 1000
-
 
 def stream(pairing, times, *, begin=0, nan=(), lost_op=()):
     """Feed PV = OP = time in s, PV first, and return what comes out."""
@@ -109,24 +108,20 @@ def stream(pairing, times, *, begin=0, nan=(), lost_op=()):
     ("times", "nan", "counts", "bad"),
     [
         (range(10), (), {}, []),
-        ([0, 1, 3, 4], (), {"bridged": 1}, []),
-        ([0, 1, 5, 6], (), {"bridged": 3}, []),
-        ([0, 1, 6, 7], (), {"missed": 4}, []),
-        (range(10), (4,), {"bridged": 1}, []),
-        (range(10), (4, 5, 6), {"bridged": 3}, []),
-        (range(10), (3, 4, 5, 6), {"bad": 4}, [3, 4, 5, 6]),
-        ([0, 1, 3, 4, 5, 6], (4,), {"bridged": 2}, []),
-        ([0, 1, 4, 5, 6, 7], (4, 5), {"bad": 4}, [2, 3, 4, 5]),
+        ([0, 1, 3, 4], (), {"missed": 1}, [2]),
+        ([0, 1, 6, 7], (), {"missed": 4}, [2, 3, 4, 5]),
+        (range(10), (4,), {"bad": 1}, [4]),
+        ([0, 1, 4, 5, 6, 7], (4, 5), {"missed": 2, "bad": 2}, [2, 3, 4, 5]),
         (range(10), (0, 1), {"bad": 2}, [0, 1]),
         ([0, 0, 1, 1, 1, 2], (), {"repeated": 3}, []),
-        ([0, 1.4, 1.6, 3], (), {"repeated": 1, "bridged": 1}, []),
+        ([0, 1.4, 1.6, 3], (), {"repeated": 1, "missed": 1}, [2]),
         ([0, 1, 2, -5, 3, 4], (), {"stale": 1}, []),
         ([0, 1, 2, 1e6, 3, 4], (), {"future": 1}, []),
         ([5, 6, 7, 0, 1, 2, 3, 8, 9], (), {"stale": 4}, []),
     ],
 )
 def test_what_becomes_of_a_stream(times, nan, counts, bad):
-    pairing = Pairing(1.0, WINDOW)
+    pairing = Pairing(1.0)
     found = stream(pairing, times, nan=nan)
     assert +pairing.counts == counts
     numbers = [s.sample for s in found]
@@ -137,60 +132,28 @@ def test_what_becomes_of_a_stream(times, nan, counts, bad):
             assert np.isnan(one.pv).all()
         else:
             assert one.pv[0] == pytest.approx(first + one.sample, abs=0.5)
-    assert sum(s.bridged for s in found) == pairing.counts["bridged"]
-    assert sum(s.missed for s in found) == pairing.counts["missed"]
 
 
-def test_a_bridge_goes_straight_and_keeps_the_op_that_was_given():
-    pairing = Pairing(1.0, WINDOW)
+def test_a_sample_that_lacks_keeps_the_op_that_was_given():
+    pairing = Pairing(1.0)
     stream(pairing, [0, 1])
-    for time in (2, 3):
-        pairing.add_applied(time * SECOND, value(10 * time))
+    pairing.add_applied(3 * SECOND, value(30))
     found = stream(pairing, [4])
-    assert [(s.sample, float(s.pv[0]), float(s.op[0]), s.bridged) for s in found] == [
-        (2, 2.0, 20.0, True),
-        (3, 3.0, 30.0, True),
-        (4, 4.0, 4.0, False),
-    ]
+    assert [(s.sample, float(s.op[0])) for s in found] == [(2, 1.0), (3, 30.0), (4, 4.0)]
+    assert [np.isnan(s.pv[0]) for s in found] == [True, True, False]
 
 
 def test_an_op_that_is_no_number_is_held_and_its_pv_kept():
-    pairing = Pairing(1.0, WINDOW)
+    pairing = Pairing(1.0)
     stream(pairing, [0, 1])
     pairing.add_pv(2 * SECOND, value(7))
-    pairing.add_applied(2 * SECOND, value(np.nan))
-    found = stream(pairing, [3])
-    assert [(float(s.pv[0]), float(s.op[0]), s.bridged) for s in found] == [
-        (7.0, 1.0, True),
-        (3.0, 3.0, False),
-    ]
-
-
-def test_not_more_than_one_percent_of_the_window_is_bridged():
-    pairing = Pairing(1.0, WINDOW)
-    times = [t for t in range(200) if t % 10 != 5]
-    found = stream(pairing, times)
-    assert pairing.counts["bridged"] == 10
-    assert [s.sample for s in found] == list(range(200))
-    assert [s.sample for s in found if np.isnan(s.pv).any()] == [
-        105,
-        115,
-        125,
-        135,
-        145,
-        155,
-        165,
-        175,
-        185,
-        195,
-    ]
-    found = stream(pairing, [t for t in range(200, 1200) if t != 1190])
-    assert [s.sample for s in found if s.bridged] == [1190]
+    found = pairing.add_applied(2 * SECOND, value(np.nan)) + stream(pairing, [3])
+    assert [(float(s.pv[0]), float(s.op[0])) for s in found] == [(7.0, 1.0), (3.0, 3.0)]
 
 
 @pytest.mark.parametrize(("older", "recognised"), [(9, False), (10, True), (30, True)])
 def test_ten_rising_stamps_of_another_time_are_a_new_run(older, recognised):
-    pairing = Pairing(1.0, WINDOW)
+    pairing = Pairing(1.0)
     stream(pairing, range(1000, 1050))
     found = stream(pairing, range(older))
     if not recognised:
@@ -206,7 +169,7 @@ def test_ten_rising_stamps_of_another_time_are_a_new_run(older, recognised):
 
 
 def test_a_new_run_takes_over_the_op_that_was_in_force_before_it():
-    pairing = Pairing(1.0, WINDOW)
+    pairing = Pairing(1.0)
     stream(pairing, range(1000, 1010))
     pairing.add_applied(-SECOND, value(77))
     found = stream(pairing, range(12), lost_op=(0,))
@@ -224,13 +187,13 @@ def test_a_new_run_takes_over_the_op_that_was_in_force_before_it():
     )
 )
 def test_no_junk_stops_what_comes_after_it(junk):
-    pairing = Pairing(1.0, WINDOW)
+    pairing = Pairing(1.0)
     stream(pairing, range(5))
     for kind, seconds, number in junk:
         add = pairing.add_pv if kind == "pv" else pairing.add_applied
         add(seconds * SECOND, value(number))
     found = stream(pairing, range(2 * 10**6, 2 * 10**6 + 25))
-    good = [s for s in found if np.isfinite(s.pv).all() and not s.bridged]
+    good = [s for s in found if np.isfinite(s.pv).all()]
     assert [float(s.pv[0]) for s in good[-10:]] == [2 * 10**6 + 15 + k for k in range(10)]
 
 

@@ -1,7 +1,6 @@
 """The estimator of a running loop: window in, trusted friction and loop model out."""
 
 import dataclasses
-from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -25,6 +24,7 @@ from stiction_ros.online.estimator.friction_change import (
 )
 from stiction_ros.online.estimator.trust import TrustedFriction, TrustRule, ValveTrust, alike
 from stiction_ros.online.plain_settings import FitSchedule
+from stiction_ros.online.window import Window
 from stiction_ros.processes import Noise, NoiseEntry
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
@@ -127,6 +127,7 @@ class LiveEstimator:
     Attributes:
         settings: in force.
         loop, valves, outputs, sample_time: of the loop; seconds.
+        window: the last samples.
     """
 
     def __init__(
@@ -143,8 +144,7 @@ class LiveEstimator:
         self.loop, self.sample_time = loop, sample_time
         self.valves, self.outputs = tuple(valves), tuple(outputs)
         self._trust = {name: ValveTrust(settings) for name in self.valves}
-        self._op: deque[FloatArray] = deque(maxlen=settings.window)
-        self._pv: deque[FloatArray] = deque(maxlen=settings.window)
+        self.window = Window(loop, valves, outputs, sample_time, settings.window)
         self._published: Mapping[str, TrustedFriction] = {}
         self._last = -1
         self._reference: Reference | None = None
@@ -158,8 +158,7 @@ class LiveEstimator:
         self.settings = settings
         for trust in self._trust.values():
             trust.rule = settings
-        self._op = deque(self._op, maxlen=settings.window)
-        self._pv = deque(self._pv, maxlen=settings.window)
+        self.window.resize(settings.window)
 
     @property
     def trusted(self) -> dict[str, TrustedFriction]:
@@ -175,29 +174,15 @@ class LiveEstimator:
         return dataclasses.replace(self.settings, law=min(laws)).options()
 
     def add(self, sample: int, op: FloatArray, pv: FloatArray) -> Record | None:
-        """Take in one sample, OP (m,) and PV (p,); return a window of finite ones if due."""
+        """Take in one sample, OP (m,) and PV (p,); return the window if a fit is due."""
         self._last = sample
-        if np.isfinite(op).all() and np.isfinite(pv).all():
-            self._op.append(np.array(op, dtype=float))
-            self._pv.append(np.array(pv, dtype=float))
-        else:
+        if not self.window.add(op, pv):
             self.restart()
-        if not self.settings.due(sample):
-            return None
-        return Record(
-            self.loop,
-            self.sample_time,
-            self.valves,
-            self.outputs,
-            np.array(self._op).reshape(-1, len(self.valves)),
-            np.array(self._pv).reshape(-1, len(self.outputs)),
-            start=(sample + 1 - len(self._op)) * self.sample_time,
-        )
+        return self.window.record(sample) if self.settings.due(sample) else None
 
     def restart(self) -> None:
         """Empty the window, as after samples that were missed; trust is kept."""
-        self._op.clear()
-        self._pv.clear()
+        self.window.keep(0)
         self._since, self._course = 0, None
 
     def conclude(self, end: int, found: Identification, record: Record | None = None) -> FitUpdate:
@@ -304,10 +289,7 @@ class LiveEstimator:
         self._changed[change.valve] = _Change(change.status, first)
         self._since = first
         self._course = None if self._course is None else self._course.before(first)
-        for signal in (self._op, self._pv):
-            kept = list(signal)[max(len(signal) - (self._last + 1 - first), 0) :]
-            signal.clear()
-            signal.extend(kept)
+        self.window.keep(self._last + 1 - first)
 
     def describe(
         self, update: FitUpdate, outputs: Sequence[OutputModel] | None = None

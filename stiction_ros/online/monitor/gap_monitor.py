@@ -15,6 +15,7 @@ from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator
 from stiction_ros.online.handover.hand_over import AtOnce
 from stiction_ros.online.monitor import gap_measure
 from stiction_ros.online.monitor.gap_finding import GapFinding, find_in_window, standing
+from stiction_ros.online.window import Window
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
 
@@ -129,8 +130,7 @@ class GapMonitor:
         arguments in another process, in order; without it they run here.
         """
         self.rule = rule
-        self._loop, self._sample_time = loop, sample_time
-        self._valves, self._outputs = tuple(valves), tuple(outputs)
+        self._of = (loop, valves, outputs, sample_time)
         self._given, self._submit = given, submit or AtOnce().submit
         self._coming: list[tuple[int, LoopModel]] = [] if given is None else [(0, given)]
         self._running: deque[tuple[GapLook, Future[GapFinding]]] = deque()
@@ -143,9 +143,7 @@ class GapMonitor:
 
     def _begin_anew(self) -> None:
         longest = max(self.rule.monitor_window, self.rule.monitor_baseline) + self.rule.lead
-        longest = max(longest, HISTORY_SAMPLES)
-        self._op: deque[FloatArray] = deque(maxlen=longest)
-        self._pv: deque[FloatArray] = deque(maxlen=longest)
+        self._window = Window(*self._of, max(longest, HISTORY_SAMPLES))
         self._reference: Record | None = None
         self._changed: int | None = None
         self._forget()
@@ -208,14 +206,12 @@ class GapMonitor:
 
     def restart(self) -> None:
         """Empty the window, as after samples that were missed; the baseline is kept."""
-        self._op.clear()
-        self._pv.clear()
+        self._window.keep(0)
 
     def add(self, sample: int, op: FloatArray, pv: FloatArray) -> GapLook | None:
         """Take in one sample, OP (m,) and PV (p,); return a measurement when one is due.
 
         Nothing is kept while the rule's ``monitor`` is false.
-        No window holds a sample that is not finite: it begins anew behind it.
         """
         look = self._measured(sample, op, pv)
         if look is not None:
@@ -249,12 +245,7 @@ class GapMonitor:
         self._take_model(sample)
         if not self.rule.monitor:
             return None
-        if not (np.isfinite(op).all() and np.isfinite(pv).all()):
-            self.restart()
-            return None
-        self._op.append(np.array(op, dtype=float))
-        self._pv.append(np.array(pv, dtype=float))
-        if (sample + 1) % self.rule.monitor_period:
+        if not self._window.add(op, pv) or (sample + 1) % self.rule.monitor_period:
             return None
         if self._reference is None:
             self._reference = self._last(self.rule.monitor_baseline, sample)
@@ -275,17 +266,8 @@ class GapMonitor:
 
     def _last(self, count: int, sample: int) -> Record | None:
         """Return all samples that are kept; None when too few for ``count`` and their lead."""
-        if len(self._op) < count + self.rule.lead:
-            return None
-        return Record(
-            self._loop,
-            self._sample_time,
-            self._valves,
-            self._outputs,
-            np.array(self._op),
-            np.array(self._pv),
-            start=(sample + 1 - len(self._op)) * self._sample_time,
-        )
+        enough = len(self._window) >= count + self.rule.lead
+        return self._window.record(sample) if enough else None
 
     def _look(self, model: LoopModel, reference: Record, window: Record, sample: int) -> GapLook:
         count = self.rule.monitor_baseline

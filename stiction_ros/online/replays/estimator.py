@@ -60,7 +60,6 @@ def replay_estimator(
             keys = {key: str(value) for key, value in estimator.status_of(one)[2]}
             kind = next(key for key in DOCUMENTS if key in keys)
             told[kind][int(keys["window_end"])] = read_status(keys)
-    first, counts = estimator.first or 0, estimator.pairs.counts
-    missed = counts["bridged"] + counts["missed"] - first  # what came before was not recorded
+    first, missed = estimator.first or 0, estimator.pairs.counts["missed"]
     due = tuple(one for one in fits if one.end >= first)
     return ReplayedEstimates(origin, first, estimator.samples, missed, due, told)

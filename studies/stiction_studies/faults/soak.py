@@ -21,12 +21,7 @@ READINGS = 5  # of memory, of which the median counts
 LOOK = 1.0  # s between two readings
 GROWTH = 1.02  # largest ratio of the memory at the end to that at a tenth
 # Keys of the statuses: what must be 0, and what is told besides.
-MISSED = (
-    ("controller", "missing"),
-    ("controller", "passed_over"),
-    ("estimator", "missed_samples"),
-    ("estimator", "bridged_samples"),
-)
+MISSED = (("controller", "missing"), ("controller", "passed_over"), ("estimator", "missed_samples"))
 TOLD = (
     ("plant", "late_op"),
     ("plant", "unanswered"),

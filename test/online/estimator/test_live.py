@@ -1,4 +1,5 @@
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -48,19 +49,20 @@ def concluded(*fits: Identification, settings: EstimatorSettings = SETTINGS) -> 
     return [live.conclude(19 + 10 * i, fit) for i, fit in enumerate(fits)]
 
 
-@pytest.mark.parametrize("bad", [25, 39])
-def test_no_window_holds_a_sample_that_is_not_finite(bad: int) -> None:
-    live, due = estimator(), {}
+@pytest.mark.parametrize(
+    ("bad", "lengths"),
+    [([25], [20, 30, 30, 30]), ([39], [20, 30, 30, 30]), (range(24, 30), [20, 0, 10, 20])],
+)
+def test_a_window_begins_anew_where_too_many_samples_lack(
+    bad: Sequence[int], lengths: list[int]
+) -> None:
+    live, due = estimator(), list[Record]()
     for k in range(50):
-        record = live.add(k, np.array([float(k)]), np.array([np.nan if k == bad else 1.0 * k]))
-        if record is not None:
-            due[k] = record
-    assert {end: len(record) for end, record in due.items()} == {
-        19: 20,
-        29: 4 if bad == 25 else 30,
-        39: 14 if bad == 25 else 0,
-        49: 24 if bad == 25 else 10,
-    }
+        pv = np.nan if k in bad else 1.0 * k
+        record = live.add(k, np.array([float(k)]), np.array([pv]))
+        due += [] if record is None else [record]
+    assert [len(record) for record in due] == lengths
+    assert all(np.isfinite(record.pv).all() for record in due)
 
 
 def test_a_window_is_due_by_the_schedule_and_slides() -> None:

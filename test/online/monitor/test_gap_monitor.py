@@ -84,10 +84,10 @@ def test_after_missed_samples_the_window_is_filled_again_and_the_baseline_kept()
     assert after[0].outputs[0].baseline == last.outputs[0].baseline
 
 
-def test_no_window_holds_a_sample_that_is_not_finite() -> None:
+def test_no_window_holds_many_samples_in_a_row_that_lack() -> None:
     made, ends = monitor(), []
     for k in range(1600):
-        pv = np.array([np.nan]) if k == 900 else HEALTHY.pv[k]
+        pv = np.array([np.nan]) if 895 <= k <= 900 else HEALTHY.pv[k]
         look = made.add(k, HEALTHY.op[k], pv)
         ends += [] if look is None else [look.end]
     assert [end for end in ends if 900 <= end < 901 + LEAD + 300 - 1] == []
