@@ -45,11 +45,10 @@ class Pairing:
         """Start empty; ``sample_time`` in seconds."""
         self._step = round(sample_time * 1e9)
         self._pv: dict[int, FloatArray] = {}
-        self._op: dict[int, FloatArray] = {}
+        # OPs by stamp, as sent and as applied
+        self._given: dict[str, dict[int, FloatArray]] = {"op": {}, "op_applied": {}}
         self._past: deque[tuple[int, FloatArray]] = deque(maxlen=2 * FAR)  # used OPs, rising
-        self._applied = False
-        self._sent: dict[int, FloatArray] = {}  # OPs that were sent while op_applied tells
-        self._untold = 0  # PVs since the last op_applied
+        self._untold = SILENT + 1  # PVs since the last op_applied
         self._last: int | None = None
         self._strays: list[tuple[int, FloatArray]] = []
         self._begins = False
@@ -57,6 +56,11 @@ class Pairing:
         self._earlier: list[tuple[int, int]] = []  # end (a sample) and origin of earlier runs
         self.origin: int | None = None
         self.counts: Counter[str] = Counter()
+
+    @property
+    def _op(self) -> dict[int, FloatArray]:
+        """The OPs that are paired now, by stamp."""
+        return self._given["op_applied" if self._untold <= SILENT else "op"]
 
     @property
     def behind(self) -> int:
@@ -82,28 +86,17 @@ class Pairing:
         self._strays.clear()
         self._accept(stamp, pv)
         self._untold += 1
-        if self._applied and self._untold > SILENT:
-            self._applied, self._op = False, {**self._op, **self._sent}
-            self._sent = {}
         return self._complete()
 
     def add_op(self, stamp: int, op: FloatArray) -> list[PairedSample]:
         """Take in an OP that was sent and return the samples that are complete now."""
-        if not self._applied:
-            return self._take_op(stamp, op)
-        keep(self._sent, stamp, op, 2 * SILENT)
-        return []
+        keep(self._given["op"], stamp, op, UNPAIRED)
+        return self._complete()
 
     def add_applied(self, stamp: int, op: FloatArray) -> list[PairedSample]:
         """Take in an OP that the valves were given and return the samples complete now."""
         self._untold = 0
-        if not self._applied:
-            self._applied, self._sent = True, {}
-            self._op = {sent: value for sent, value in self._op.items() if sent < stamp}
-        return self._take_op(stamp, op)
-
-    def _take_op(self, stamp: int, op: FloatArray) -> list[PairedSample]:
-        keep(self._op, stamp, op, UNPAIRED)
+        keep(self._given["op_applied"], stamp, op, UNPAIRED)
         return self._complete()
 
     # ---- stamps ----------------------------------------------------------------------------
@@ -132,7 +125,9 @@ class Pairing:
         self._past.clear()
         self._pv.clear()
         early, late = first - 2 * self._step, last + FAR * self._step
-        self._op = {sent: value for sent, value in self._op.items() if early < sent < late}
+        for given in self._given.values():
+            for sent in [sent for sent in given if not early < sent < late]:
+                del given[sent]
         for stamp, pv in strays:
             self._accept(stamp, pv)
         return self._complete()
