@@ -11,10 +11,10 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.nodes.shared.managed import READER_QOS
 from stiction_ros.nodes.shared.messages import to_ns
 from stiction_ros.nodes.shared.peers import Inlet
+from stiction_ros.online.input.samples import picked
 from stiction_ros.online.pairing import PairedSample, Pairing
 from stiction_ros.records import Record
 from stiction_ros.records.record import Quality
@@ -36,21 +36,20 @@ class LoopWindow:
         self.name, self.sample_time = name, sample_time
         self._pairs = Pairing(sample_time)
         self._window: deque[PairedSample] = deque(maxlen=window)
-        self._valves: tuple[str, ...] = ()
-        self._outputs: tuple[str, ...] = ()
+        self._tags: dict[str, tuple[str, ...]] = {}  # as the first message of each topic has them
         self.samples = 0
 
-    def add_pv(self, stamp: int, outputs: Sequence[str], pv: FloatArray) -> None:
-        """Take in a PV, stamp in ns."""
-        self._outputs = self._outputs or tuple(outputs)
-        if tuple(outputs) == self._outputs:
-            self._keep(self._pairs.add_pv(stamp, pv))
-
-    def add_applied(self, stamp: int, valves: Sequence[str], op: FloatArray) -> None:
-        """Take in an OP that was in force, stamp in ns."""
-        self._valves = self._valves or tuple(valves)
-        if tuple(valves) == self._valves:
-            self._keep(self._pairs.add_applied(stamp, op))
+    def take(self, topic: str, stamp: int, tags: Sequence[str], values: Sequence[float]) -> None:
+        """Take in a message of ``pv`` or ``op_applied``, stamp in ns; other tags are left out."""
+        found = picked(tags, values, self._tags.setdefault(topic, tuple(tags)))
+        if found is None:
+            return
+        add = self._pairs.add_pv if topic == "pv" else self._pairs.add_applied
+        for one in add(stamp, found):
+            if one.begins:
+                self._window.clear()
+            self.samples += 1
+            self._window.append(one)
 
     @property
     def counts(self) -> Counter[str]:
@@ -72,20 +71,13 @@ class LoopWindow:
         return Record(
             self.name,
             self.sample_time,
-            self._valves,
-            self._outputs,
+            self._tags["op_applied"],
+            self._tags["pv"],
             op,
             pv,
             start=rows[0].stamp / 1e9,
             mask=mask,
         )
-
-    def _keep(self, found: Sequence[PairedSample]) -> None:
-        for one in found:
-            if one.begins:
-                self._window.clear()
-            self.samples += 1
-            self._window.append(one)
 
 
 class Listener:
@@ -131,18 +123,12 @@ class Listener:
             if name not in self.windows:
                 window = LoopWindow(name, self._sample_time, self._window)
                 self.windows[name] = window
-                self._listen(applied, _reader(window.add_applied))
-                self._listen(topic, _reader(window.add_pv))
+                self._listen(window, applied, "op_applied")
+                self._listen(window, topic, "pv")
 
-    def _listen(self, topic: str, take: Callable[[JointState], None]) -> None:
+    def _listen(self, window: LoopWindow, topic: str, kind: str) -> None:
+        def take(message: JointState) -> None:
+            window.take(kind, to_ns(message.header.stamp), message.name, message.position)
+
         subscription = self.node.create_subscription(JointState, topic, take, READER_QOS)
         self._inlets.append(Inlet(subscription, (), READER_QOS))
-
-
-def _reader(add: Callable[..., None]) -> Callable[[JointState], None]:
-    def take(message: JointState) -> None:
-        values = np.array(message.position, dtype=float)
-        if len(values) == len(message.name):
-            add(to_ns(message.header.stamp), message.name, values)
-
-    return take

@@ -98,8 +98,8 @@ def filled(count: int, without: tuple[int, ...] = (), window: int = 100) -> Loop
     loop = LoopWindow("unit", 1.0, window)
     for k in range(count):
         if k not in without:
-            loop.add_applied((k - 1) * SECOND, ("V1",), np.array([40.0 + k - 1]))
-            loop.add_pv(k * SECOND, ("PV1",), np.array([10.0 + k]))
+            loop.take("op_applied", (k - 1) * SECOND, ("V1",), [40.0 + k - 1])
+            loop.take("pv", k * SECOND, ("PV1",), [10.0 + k])
     return loop
 
 
@@ -131,11 +131,11 @@ def test_samples_that_never_came_are_counted_and_marked() -> None:
 
 def test_bad_samples_are_marked() -> None:
     loop = filled(20)
-    loop.add_applied(19 * SECOND, ("V1",), np.array([59.0]))
-    loop.add_pv(20 * SECOND, ("PV1",), np.array([np.nan]))
-    loop.add_applied(20 * SECOND, ("V1",), np.array([60.0]))
-    loop.add_pv(21 * SECOND, ("PV1",), np.array([31.0]))
-    loop.add_applied(21 * SECOND, ("V1",), np.array([61.0]))
+    loop.take("op_applied", 19 * SECOND, ("V1",), [59.0])
+    loop.take("pv", 20 * SECOND, ("PV1",), [np.nan])
+    loop.take("op_applied", 20 * SECOND, ("V1",), [60.0])
+    loop.take("pv", 21 * SECOND, ("PV1",), [31.0])
+    loop.take("op_applied", 21 * SECOND, ("V1",), [61.0])
     record = loop.record()
     assert record is not None
     assert np.flatnonzero(record.quality == Quality.BAD).tolist() == [20]
@@ -143,7 +143,7 @@ def test_bad_samples_are_marked() -> None:
 
 def test_other_tags_are_left_alone() -> None:
     loop = filled(10)
-    loop.add_pv(10 * SECOND, ("PV2",), np.array([1.0]))
+    loop.take("pv", 10 * SECOND, ("PV2",), [1.0])
     assert loop.samples == 9
 
 
