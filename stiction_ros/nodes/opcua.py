@@ -6,7 +6,6 @@ import time
 from typing import Any
 
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
@@ -227,20 +226,14 @@ class OpcuaNode(ManagedNode):
             self.notice(found.value, "warn", complaint)
         self._submit(orders)
 
-    def _on_ask(
-        self, name: str, _request: Trigger.Request, response: Trigger.Response
-    ) -> Trigger.Response:
+    def _on_ask(self, name: str) -> tuple[bool, str]:
         bridge, now = self.bridges[name], time.monotonic()
         why_not = bridge.ask(now)
         self._submit(bridge.look(now))
         waits = f"; {bridge.grant.reason}" if bridge.grant.wanted else ""
-        response.success, response.message = not why_not, why_not or f"asked for{waits}"
-        return response
+        return not why_not, why_not or f"asked for{waits}"
 
-    def _on_give_back(
-        self, name: str, _request: Trigger.Request, response: Trigger.Response
-    ) -> Trigger.Response:
+    def _on_give_back(self, name: str) -> tuple[bool, str]:
         self._submit(self.bridges[name].give_back(time.monotonic(), "given back by service"))
         self._tell_grants()
-        response.success, response.message = True, "given back"
-        return response
+        return True, "given back"

@@ -6,7 +6,6 @@ from typing import Any
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import Trigger
 
 from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS, ManagedNode
@@ -119,31 +118,28 @@ class PlayerNode(ManagedNode):
 
     # ---- services --------------------------------------------------------------------------
 
-    def _on_pause(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _on_pause(self) -> tuple[bool, str]:
         if self.running:
             self.playback.pause()
-        return self._answer(response)
+        return self._answer()
 
-    def _on_resume(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _on_resume(self) -> tuple[bool, str]:
         if self.running:
             self.playback.resume()
-        return self._answer(response)
+        return self._answer()
 
-    def _on_step(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _on_step(self) -> tuple[bool, str]:
         if self.running and not self.playback.paused:
-            response.success, response.message = False, "it is playing, pause it first"
-            return response
+            return False, "it is playing, pause it first"
         if self.running:
             self._send(self.playback.next_messages())
-        return self._answer(response)
+        return self._answer()
 
-    def _answer(self, response: Trigger.Response) -> Trigger.Response:
-        """Fill the answer in: the time that is being played."""
-        response.success = bool(self.running)
-        at = f"at {self.playback.time / SECOND:.9f} s"
-        response.message = at if self.running else "not active"
+    def _answer(self) -> tuple[bool, str]:
+        """Return whether it was done, and the time that is being played."""
         self.report()
-        return response
+        at = f"at {self.playback.time / SECOND:.9f} s"
+        return bool(self.running), at if self.running else "not active"
 
 
 def _profile(qos: Qos) -> QoSProfile:

@@ -218,7 +218,12 @@ class ManagedNode(LifecycleNode):
 
     def offer(self, name: str, call: Callable[[Any, Any], Any]) -> None:
         """Offer a service that takes nothing and answers whether it was done, and what to say."""
-        self._offered.append(self.create_service(Trigger, name, call))
+
+        def serve(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.success, response.message = call()
+            return response
+
+        self._offered.append(self.create_service(Trigger, name, serve))
 
     def linked(self) -> None:
         """Called once when everything in ``wait_for`` has matched, in both directions."""
