@@ -227,9 +227,9 @@ class OpcuaNode(ManagedNode):
         self._submit(orders)
 
     def _on_ask(self, name: str) -> tuple[bool, str]:
-        bridge, now = self.bridges[name], time.monotonic()
-        why_not = bridge.ask(now)
-        self._submit(bridge.look(now))
+        bridge = self.bridges[name]
+        why_not = bridge.ask()
+        self._submit(bridge.look(time.monotonic()))
         waits = f"; {bridge.grant.reason}" if bridge.grant.wanted else ""
         return not why_not, why_not or f"asked for{waits}"
 

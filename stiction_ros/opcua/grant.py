@@ -18,7 +18,6 @@ class Grant:
     """The state of the handshake, as a value."""
 
     state: GrantState  # where it stands
-    since: float  # s on our clock
     reason: str  # why it stands there
     wanted: bool = False  # whether it is to be asked for as soon as nothing speaks against it
     lost: bool = False  # whether it was asked for or granted before and is so no longer
@@ -39,13 +38,13 @@ class Grant:
             return self
         return dataclasses.replace(self, wanted=True, lost=False)
 
-    def give_back(self, now: float, reason: str) -> "Grant":
+    def give_back(self, reason: str) -> "Grant":
         """Return to idle, and stay there until it is asked for again."""
         if self.state is GrantState.LISTENING:
             return self
-        return Grant(GrantState.IDLE, now, reason, lost=self.requesting)
+        return Grant(GrantState.IDLE, reason, lost=self.requesting)
 
-    def follow(self, now: float, granted: bool, fault: str = "") -> "Grant":
+    def follow(self, granted: bool, fault: str = "") -> "Grant":
         """Return what becomes of it.
 
         - idle and wanted: asked, once nothing speaks against it.
@@ -55,7 +54,6 @@ class Grant:
         A grant that was lost is not asked for again by itself: the operator may have meant it.
 
         Args:
-            now: s on our clock.
             granted: whether the mode of every valve grants remote operation, by good quality.
             fault: what speaks against writing now; empty for nothing.
         """
@@ -65,18 +63,18 @@ class Grant:
             why = fault or "the mode grants what was not asked for" * granted
             if why:
                 return dataclasses.replace(self, reason=f"waits: {why}")
-            return Grant(GrantState.ASKED, now, "waits for the operator")
+            return Grant(GrantState.ASKED, "waits for the operator")
         if fault:
-            return self.give_back(now, fault)
+            return self.give_back(fault)
         if self.state is GrantState.ASKED and granted:
-            return Grant(GrantState.GRANTED, now, "granted by the mode")
+            return Grant(GrantState.GRANTED, "granted by the mode")
         if self.state is GrantState.GRANTED and not granted:
-            return self.give_back(now, "taken back by the mode")
+            return self.give_back("taken back by the mode")
         return self
 
 
-def begin(now: float, writes: bool) -> Grant:
+def begin(writes: bool) -> Grant:
     """Return the grant of a node that has just begun."""
     if writes:
-        return Grant(GrantState.IDLE, now, "not asked for")
-    return Grant(GrantState.LISTENING, now, "writing is off")
+        return Grant(GrantState.IDLE, "not asked for")
+    return Grant(GrantState.LISTENING, "writing is off")

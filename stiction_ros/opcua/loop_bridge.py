@@ -87,7 +87,7 @@ class LoopBridge:
         """Begin to listen; ``rules.writes`` needs ``tags.grant``."""
         self.tags, self.rules = tags, rules
         self.sampler = LoopSampler(tags, rules.speed)
-        self.grant = begin(now, rules.writes and tags.grant is not None)
+        self.grant = begin(rules.writes and tags.grant is not None)
         if rules.asks:
             self.grant = self.grant.ask()
         self.op_port = OpPort(rules.commander, tags.sample_ns, exact=False)
@@ -167,7 +167,7 @@ class LoopBridge:
 
     # ---- the grant -------------------------------------------------------------------------
 
-    def ask(self, now: float) -> str:
+    def ask(self) -> str:
         """Ask for the grant; return why not, empty when it is asked for."""
         if self.grant.state is GrantState.LISTENING:
             return "writing is off"
@@ -178,7 +178,7 @@ class LoopBridge:
 
     def give_back(self, now: float, reason: str) -> list[WriteOrder]:
         """Leave the valves to the plant, and return what is to be written."""
-        self.grant = self.grant.give_back(now, reason)
+        self.grant = self.grant.give_back(reason)
         return self.look(now)
 
     def look(self, now: float) -> list[WriteOrder]:
@@ -188,7 +188,7 @@ class LoopBridge:
         told, before = self.tags.grant, self.grant.state
         assert told is not None
         modes = (self.sampler.latest(valve.mode) for valve in self.tags.valves)
-        self.grant = self.grant.follow(now, all_grant(modes, told.granted), self._fault(now))
+        self.grant = self.grant.follow(all_grant(modes, told.granted), self._fault(now))
         if self.grant.state is not before:
             self._last = None
         return [*self._request(now), *self._beats(now)]

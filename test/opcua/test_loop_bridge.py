@@ -97,7 +97,7 @@ def test_listening_writes_nothing_whatever_is_asked() -> None:
     plant.run(10)
     plant.set_mode("ROUT")
     plant.run(10)
-    assert plant.bridge.ask(plant.now) == "writing is off"
+    assert plant.bridge.ask() == "writing is off"
     assert plant.orders == []
 
 
@@ -133,7 +133,7 @@ def test_ops_that_the_rate_cuts_are_told() -> None:
     )
     plant.set_mode("AUTO")
     plant.run(3)
-    plant.bridge.ask(plant.now)
+    plant.bridge.ask()
     plant.granted()
     assert watch.text() == ""  # a new grant, on its way to what is wanted
 
@@ -257,7 +257,7 @@ def test_it_can_be_asked_for_again() -> None:
     plant = Plant().granted()
     plant.set_mode("AUTO")
     plant.run(3)
-    assert plant.bridge.ask(plant.now) == ""
+    assert plant.bridge.ask() == ""
     plant.run(3)
     assert plant.bridge.grant.state is GrantState.ASKED
     plant.op = 61.0
@@ -272,7 +272,7 @@ def test_a_request_that_is_still_being_taken_back_is_not_made_anew() -> None:
     plant.set_mode("AUTO")
     assert plant.orders[-1].values[0][1] == 0.0
     taking_back = plant.orders[-1]
-    plant.bridge.ask(plant.now)
+    plant.bridge.ask()
     plant.set_mode(ROUT)  # a grant of the request that still stands there
     assert plant.bridge.grant.state is GrantState.IDLE
     assert "being taken back" in plant.bridge.grant.reason
@@ -294,7 +294,7 @@ def test_a_pending_ask_waits_until_it_can_be_made_or_is_taken_back() -> None:
     plant.run(10)
     assert plant.orders == []
     assert plant.bridge.grant.reason == "given back by service"
-    assert plant.bridge.ask(plant.now) == ""
+    assert plant.bridge.ask() == ""
     plant.run(1)
     assert plant.bridge.grant.state is GrantState.ASKED
 
