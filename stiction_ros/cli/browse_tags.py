@@ -9,29 +9,22 @@ import yaml
 
 from stiction_ros.errors import InputError, storing
 from stiction_ros.opcua import require_asyncua
-from stiction_ros.opcua.security import SECURITY, Credentials
+from stiction_ros.opcua.security import Credentials
 from stiction_ros.opcua.tag_map import TagMap, check_address
+from stiction_ros.settings import settings_of
 
 
 def add_session(parser: argparse.ArgumentParser) -> None:
     """Add the options that say how a session is secured."""
     group = parser.add_argument_group("session")
-    group.add_argument(
-        "--security", choices=SECURITY, default=SECURITY[0], help="security of the messages"
-    )
-    for name, metavar, text in (
-        ("--certificate", "F", "our certificate, DER"),
-        ("--private-key", "F", "our private key, PEM, mode 600"),
-        ("--server-certificate", "F", "pinned certificate of the server, DER"),
-        ("--user", "NAME", "name of the user"),
-        ("--password-file", "F", "file with the password, mode 600"),
-    ):
-        group.add_argument(name, default="", metavar=metavar, help=text)
+    for entry in settings_of(Credentials):
+        name, choices = f"--{entry.name.replace('_', '-')}", entry.choices or None
+        group.add_argument(name, default=entry.default, choices=choices, help=entry.description)
 
 
 def credentials_of(options: argparse.Namespace) -> Credentials:
     """Return what the options say, checked."""
-    found = Credentials.of(options)
+    found = Credentials(*(getattr(options, entry.name) for entry in settings_of(Credentials)))
     found.check(writes=False)
     return found
 

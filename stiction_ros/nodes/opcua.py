@@ -1,5 +1,6 @@
 """The driver of a real plant: tags of a control system to topics, and OP back under its grant."""
 
+import dataclasses
 import functools
 import random
 import time
@@ -12,11 +13,16 @@ from stiction_ros.errors import InputError
 from stiction_ros.nodes.opcua_topics import LoopTopics, grant_keys
 from stiction_ros.nodes.shared.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import to_ns, values_of
-from stiction_ros.online.plain_settings import OpcuaNodeSettings
 from stiction_ros.opcua import require_asyncua
 from stiction_ros.opcua.loop_bridge import IDENTITIES, BridgeRules, LoopBridge, WriteOrder
-from stiction_ros.opcua.plant_link import Heard, Linked, LinkSettings, PlantLink, Refused, Written
-from stiction_ros.opcua.security import Credentials
+from stiction_ros.opcua.plant_link import (
+    Heard,
+    Linked,
+    OpcuaNodeSettings,
+    PlantLink,
+    Refused,
+    Written,
+)
 from stiction_ros.opcua.tag_map import LoopTags, TagMap, check_address
 
 QUICKEST, SLOWEST = 0.005, 0.05  # s between two looks for samples that are due
@@ -42,8 +48,7 @@ class OpcuaNode(ManagedNode):
         chosen = self._chosen(told)
         self._url = settings.url or told.server
         check_address(self._url, "opcua: url")
-        self._credentials = Credentials.of(settings)
-        self._credentials.check(bool(self._writes))
+        settings.check(bool(self._writes))
         self._said = "not connected yet"
         self._losses = 0
         self._refused: set[str] = set()
@@ -97,9 +102,8 @@ class OpcuaNode(ManagedNode):
     def activate(self) -> None:
         writing = [bridge.tags for bridge in self.bridges.values() if bridge.rules.writes]
         written = {tag: use for tags in writing for tag, use in tags.uses()}
-        read, publishing = tuple(self._by_tag), self.settings.publishing
-        settings = LinkSettings(self._url, self._credentials, read, written, publishing)
-        self._link = PlantLink(settings, self._wake)
+        settings = dataclasses.replace(self.settings, url=self._url)
+        self._link = PlantLink(settings, tuple(self._by_tag), written, self._wake)
         self._link.start()
         shortest = min(bridge.period for bridge in self.bridges.values())
         self.every(min(max(shortest / PART, QUICKEST), SLOWEST), "serve", self._serve)

@@ -142,55 +142,6 @@ class PlayerNodeSettings(NodeSettings):
 
 
 @dataclasses.dataclass(frozen=True)
-class OpcuaNodeSettings(NodeSettings):
-    """Which control system is listened to, how, and what may be written there."""
-
-    tags: str = setting("", "tag map, *.tags.yaml", fixed=True)
-    url: str = setting(
-        "", "address of the server, opc.tcp://HOST:PORT; empty for that of the tag map", fixed=True
-    )
-    loops: tuple[str, ...] = setting((), "loops of the tag map; empty for all", fixed=True)
-    security: str = setting(
-        "sign_and_encrypt",
-        "sign_and_encrypt (Basic256Sha256), or none, by which nothing can be written",
-        choices=("sign_and_encrypt", "none"),
-        fixed=True,
-    )
-    certificate: str = setting("", "file of our certificate, DER", fixed=True)
-    private_key: str = setting("", "file of our key, PEM, mode 600", fixed=True)
-    server_certificate: str = setting(
-        "", "file of the certificate that the server must show, DER", fixed=True
-    )
-    user: str = setting("", "name of the user; empty for none", fixed=True)
-    password_file: str = setting("", "file of the user's password, mode 600", fixed=True)
-    publishing: float = setting(
-        0.1, "s between two publications of the server", low=0.005, high=60.0, fixed=True
-    )
-    write: tuple[str, ...] = setting(
-        (), "loops whose OP may be written while the plant grants it; empty for none", fixed=True
-    )
-    ask: str = setting(
-        "service",
-        "when the grant is asked for: by the service ask_grant of the loop, or once at the start",
-        choices=("service", "start"),
-        fixed=True,
-    )
-    commander: str = setting(
-        "controller",
-        "the only node whose op is written, as it names itself in frame_id; without a leading "
-        "slash in the loop's namespace",
-        fixed=True,
-    )
-    speed: float = setting(
-        1.0,
-        "seconds of the plant per second, other than 1 for a simulated one",
-        low=1e-3,
-        high=1e6,
-        fixed=True,
-    )
-
-
-@dataclasses.dataclass(frozen=True)
 class FitSchedule:
     """Shared by estimator and controller, so that a run does not depend on speed.
 

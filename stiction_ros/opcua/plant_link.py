@@ -11,12 +11,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from stiction_ros.errors import InputError
+from stiction_ros.online.plain_settings import NodeSettings
 from stiction_ros.opcua.loop_bridge import WriteOrder
 from stiction_ros.opcua.sampling import TagReading
 from stiction_ros.opcua.security import Credentials
 from stiction_ros.opcua.server_tags import ServerTags
 from stiction_ros.opcua.session import ANSWER, describe, is_open, open_client, reading_of, write
 from stiction_ros.opcua.tag_map import Use
+from stiction_ros.settings import setting
 
 if TYPE_CHECKING:
     from asyncua import Client
@@ -30,15 +32,39 @@ ROOM = 200_000  # changes that wait here
 
 
 @dataclasses.dataclass(frozen=True)
-class LinkSettings:
-    """Where to, how, and what is heard there."""
+class OpcuaNodeSettings(NodeSettings, Credentials):
+    """Which control system is listened to, how, and what may be written there."""
 
-    url: str  # of the server
-    credentials: Credentials  # of the session
-    tags: tuple[str, ...]  # that are subscribed to
-    written: Mapping[str, Use] = dataclasses.field(default_factory=dict)  # and what for
-    publishing: float = 0.1  # s between two publications of the server
-    asked_again: float = ASKED_AGAIN  # s until tags that the server refuses are tried again
+    tags: str = setting("", "tag map, *.tags.yaml", fixed=True)
+    url: str = setting(
+        "", "address of the server, opc.tcp://HOST:PORT; empty for that of the tag map", fixed=True
+    )
+    loops: tuple[str, ...] = setting((), "loops of the tag map; empty for all", fixed=True)
+    publishing: float = setting(
+        0.1, "s between two publications of the server", low=0.005, high=60.0, fixed=True
+    )
+    write: tuple[str, ...] = setting(
+        (), "loops whose OP may be written while the plant grants it; empty for none", fixed=True
+    )
+    ask: str = setting(
+        "service",
+        "when the grant is asked for: by the service ask_grant of the loop, or once at the start",
+        choices=("service", "start"),
+        fixed=True,
+    )
+    commander: str = setting(
+        "controller",
+        "the only node whose op is written, as it names itself in frame_id; without a leading "
+        "slash in the loop's namespace",
+        fixed=True,
+    )
+    speed: float = setting(
+        1.0,
+        "seconds of the plant per second, other than 1 for a simulated one",
+        low=1e-3,
+        high=1e6,
+        fixed=True,
+    )
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -85,9 +111,16 @@ class PlantLink:
     queue until :meth:`drain`; ``wake`` is called (in the link's thread) when something came.
     """
 
-    def __init__(self, settings: LinkSettings, wake: Callable[[], None] | None = None) -> None:
-        """Prepare; :meth:`start` connects."""
+    def __init__(
+        self,
+        settings: OpcuaNodeSettings,
+        read: Sequence[str],
+        written: Mapping[str, Use],
+        wake: Callable[[], None] | None = None,
+    ) -> None:
+        """Prepare; :meth:`start` connects. ``written`` says what each tag is written for."""
         self.settings = settings
+        self._tags = (read, written)
         self._wake = wake or (lambda: None)
         self._events: deque[LinkEvent] = deque()
         self._heard_at = float("-inf")
@@ -153,7 +186,7 @@ class PlantLink:
         from asyncua import ua
 
         try:
-            client = await open_client(self.settings.url, self.settings.credentials)
+            client = await open_client(self.settings.url, self.settings)
         except (OSError, TimeoutError, InputError, ua.UaError) as error:
             return describe(error)
         except Exception as error:  # of the certificates' library, whose errors share no base
@@ -169,7 +202,7 @@ class PlantLink:
                 await asyncio.wait_for(client.disconnect(), ANSWER)
 
     async def _session(self, client: "Client") -> str:
-        tags = ServerTags(client, self.settings.tags, self.settings.written)
+        tags = ServerTags(client, *self._tags)
         await tags.find()
         self._forget_orders()
         self._heard_at = time.monotonic()
@@ -199,7 +232,7 @@ class PlantLink:
     async def _ask_again(self, subscription: Any, tags: ServerTags) -> str:
         """Try refused tags again from time to time: somebody may mend them at the server."""
         while True:
-            await asyncio.sleep(self.settings.asked_again)
+            await asyncio.sleep(ASKED_AGAIN)
             before = tags.refused
             if not any(before):
                 continue

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stiction_ros.errors import InputError, storing
+from stiction_ros.settings import setting
 
 if TYPE_CHECKING:
     from cryptography import x509
@@ -16,24 +17,25 @@ if TYPE_CHECKING:
 KEY_BITS = 2048  # Basic256Sha256 asks for 2048 to 4096
 DAYS = 365
 CLIENT_URI = "urn:stiction_ros:opcua"
-SECURITY = ("sign_and_encrypt", "none")
 
 
 @dataclasses.dataclass(frozen=True)
 class Credentials:
     """How a session is secured; nothing secret is kept here, only where it stands."""
 
-    security: str = SECURITY[0]  # ``sign_and_encrypt`` (Basic256Sha256) or ``none``
-    certificate: str = ""  # certificate, private_key: files of ours, DER and PEM
-    private_key: str = ""
-    server_certificate: str = ""  # file of the certificate that the server must show, DER
-    user: str = ""  # name; empty for none
-    password_file: str = ""  # file of the password
-
-    @classmethod
-    def of(cls, given: object) -> "Credentials":
-        """Return what settings, or options of a command, say under the same names."""
-        return cls(*(getattr(given, field.name) for field in dataclasses.fields(cls)))
+    security: str = setting(
+        "sign_and_encrypt",
+        "sign_and_encrypt (Basic256Sha256), or none, by which nothing can be written",
+        choices=("sign_and_encrypt", "none"),
+        fixed=True,
+    )
+    certificate: str = setting("", "file of our certificate, DER", fixed=True)
+    private_key: str = setting("", "file of our key, PEM, mode 600", fixed=True)
+    server_certificate: str = setting(
+        "", "file of the certificate that the server must show, DER", fixed=True
+    )
+    user: str = setting("", "name of the user; empty for none", fixed=True)
+    password_file: str = setting("", "file of the user's password, mode 600", fixed=True)
 
     def check(self, writes: bool) -> None:
         """Refuse what cannot be connected with, and writing without encryption or user."""

@@ -13,7 +13,14 @@ import yaml
 
 from stiction_ros.opcua.grant import Grant, GrantState
 from stiction_ros.opcua.loop_bridge import BridgeRules, LoopBridge
-from stiction_ros.opcua.plant_link import Heard, Linked, LinkSettings, PlantLink, Refused, Written
+from stiction_ros.opcua.plant_link import (
+    Heard,
+    Linked,
+    OpcuaNodeSettings,
+    PlantLink,
+    Refused,
+    Written,
+)
 from stiction_ros.opcua.sampling import PlantSample
 from stiction_ros.opcua.security import Credentials
 from stiction_ros.opcua.tag_map import TagMap
@@ -37,8 +44,8 @@ class BridgeRunner:
     ) -> None:
         self.tags = TagMap.load(map_file).loops[0]
         written = dict(self.tags.uses())
-        settings = LinkSettings(url, credentials, self.tags.read_tags(), written, 0.02)
-        self.link = PlantLink(settings)
+        settings = OpcuaNodeSettings(url=url, publishing=0.02, **vars(credentials))
+        self.link = PlantLink(settings, self.tags.read_tags(), written)
         rules = BridgeRules(speed, True, asks, SENDER, identity)
         self.bridge = LoopBridge(self.tags, rules, time.monotonic())
         self.samples: list[PlantSample] = []

@@ -23,8 +23,8 @@ from stiction_ros.cli.main import main
 from stiction_ros.opcua import session
 from stiction_ros.opcua.grant import GrantState
 from stiction_ros.opcua.loop_bridge import WriteOrder
-from stiction_ros.opcua.plant_link import LinkSettings, PlantLink, Written
-from stiction_ros.opcua.security import Credentials, fingerprint, load_certificate
+from stiction_ros.opcua.plant_link import OpcuaNodeSettings, PlantLink, Written
+from stiction_ros.opcua.security import fingerprint, load_certificate
 from stiction_ros.opcua.session import open_client
 from stiction_ros.opcua.tag_map import Use
 from stiction_studies.faults.bridge.relay import Relay
@@ -337,7 +337,7 @@ def test_a_connection_that_is_closed_at_once_is_not_waited_for(
 
 
 def test_a_request_goes_before_what_its_loop_waits_to_write() -> None:
-    link = PlantLink(LinkSettings("opc.tcp://127.0.0.1:1", Credentials(security="none"), ()))
+    link = PlantLink(OpcuaNodeSettings(url="opc.tcp://127.0.0.1:1", security="none"), (), {})
 
     def order(loop: str, kind: Use) -> WriteOrder:
         return WriteOrder(loop, kind, (("s=X", 0.0),), 1e9)

@@ -10,7 +10,7 @@ import yaml
 
 from stiction_ros.cli.main import main
 from stiction_ros.cli.shared.scenarios import SCENARIOS
-from stiction_ros.online.plain_settings import OpcuaNodeSettings
+from stiction_ros.opcua.plant_link import OpcuaNodeSettings
 from stiction_ros.opcua.tag_map import TagMap
 from stiction_ros.settings import from_mapping
 from stiction_studies.commands import demo_opcua
