@@ -189,10 +189,8 @@ class OpcuaNode(ManagedNode):
     def _on_refused(self, event: Refused) -> None:
         now, before = time.monotonic(), self._refused
         for bridge in self.bridges.values():
-            self._submit(bridge.refuse(event.read, event.written, now))
-        self._refused = {
-            f"tag {tag} {why}" for tag, why in (*event.read.items(), *event.written.items())
-        }
+            self._submit(bridge.refuse(event.tags, now))
+        self._refused = {text for bridge in self.bridges.values() for text in bridge.refused}
         for text in sorted(self._refused - before):
             self.log.warning(text)
         if self._refused != before:

@@ -123,15 +123,11 @@ class LoopBridge:
         self._alive = alive
         return self.look(now)
 
-    def refuse(
-        self, read: Mapping[str, str], written: Mapping[str, str], now: float
-    ) -> list[WriteOrder]:
+    def refuse(self, refused: Mapping[str, str], now: float) -> list[WriteOrder]:
         """Take in which tags of any loop the server refuses, and why; return what to write."""
-        found = [f"tag {tag} {read[tag]}" for tag in self.tags.read_tags() if tag in read]
-        if self.rules.writes:
-            mine = [tag for tag, _ in self.tags.uses() if tag in written]
-            found += [f"tag {tag} {written[tag]}" for tag in mine]
-        self.refused = tuple(dict.fromkeys(found))
+        written = [tag for tag, _ in self.tags.uses()] if self.rules.writes else []
+        mine = dict.fromkeys((*self.tags.read_tags(), *written))
+        self.refused = tuple(f"tag {tag} {refused[tag]}" for tag in mine if tag in refused)
         return self.look(now)
 
     def hear(self, tag: str, reading: TagReading, now: float) -> list[WriteOrder]:

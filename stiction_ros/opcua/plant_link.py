@@ -95,10 +95,9 @@ class Written:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Refused:
-    """Tags that the server refuses now, each with why: those not listened to, those not written."""
+    """Tags that the server refuses now, each with why."""
 
-    read: Mapping[str, str]
-    written: Mapping[str, str]
+    tags: Mapping[str, str]
 
 
 LinkEvent = Heard | Linked | Written | Refused
@@ -203,12 +202,11 @@ class PlantLink:
 
     async def _session(self, client: "Client") -> str:
         tags = ServerTags(client, *self._tags)
-        await tags.find()
         self._forget_orders()
         self._heard_at = time.monotonic()
         subscription = await self._subscribe(client)
-        await tags.subscribe(subscription, self._sampling)
-        self._tell(Refused(*tags.refused))
+        await tags.ask(subscription, self._sampling)
+        self._tell(Refused(tags.refused))
         self._connected = True
         self._tell(Linked(True, f"connected to {self.settings.url}"))
         listening = asyncio.create_task(self._listen(subscription, tags))
@@ -234,12 +232,10 @@ class PlantLink:
         while True:
             await asyncio.sleep(ASKED_AGAIN)
             before = tags.refused
-            if not any(before):
-                continue
-            await tags.find()
-            await tags.subscribe(subscription, self._sampling)
+            if before:
+                await tags.ask(subscription, self._sampling)
             if tags.refused != before:
-                self._tell(Refused(*tags.refused))
+                self._tell(Refused(tags.refused))
 
     @property
     def _sampling(self) -> float:

@@ -27,46 +27,49 @@ class ServerTags:
     Attributes:
         nodes: of the tags that are node ids of a namespace that is there.
         kinds: type of number that a written tag takes; without those that are refused.
-        unread, unwritten: why a tag is refused, for those that are.
+        refused: why a tag is refused, for those that are.
     """
 
     def __init__(self, client: "Client", read: Sequence[str], written: Mapping[str, Use]) -> None:
-        """Take the tags; :meth:`find` and :meth:`subscribe` ask the server."""
-        self._client, self._written = client, written
+        """Take the tags; :meth:`ask` asks the server."""
+        self._client, self._read, self._written = client, read, written
+        self._heard: set[str] = set()  # tags that are subscribed to
         self._names: dict[ua.NodeId, list[str]] = {}
         self._writers: dict[ua.NodeId, str] = {}  # the first tag of each written node
         self.nodes: dict[str, ua.NodeId] = {}
         self.kinds: dict[str, ua.VariantType] = {}
-        self.unread: dict[str, str] = dict.fromkeys(read, "is not known yet")
-        self.unwritten: dict[str, str] = dict.fromkeys(written, "is not known yet")
-
-    @property
-    def refused(self) -> tuple[Mapping[str, str], Mapping[str, str]]:
-        """Copies of ``unread`` and ``unwritten``."""
-        return dict(self.unread), dict(self.unwritten)
+        self.refused = dict.fromkeys((*read, *written), "is not known yet")
 
     def of(self, node: "ua.NodeId") -> list[str]:
         """Return the tags that are read from a node."""
         return self._names.get(node, [])
 
-    async def find(self) -> None:
-        """Ask for the nodes of all refused tags and for the types of those that are written."""
+    async def ask(self, subscription: Any, interval: float) -> None:
+        """Ask for all that is refused: nodes, types of what is written, changes of what is read.
+
+        Changes are sampled every ``interval`` ms.
+        """
         spaces = await self._client.get_namespace_array()
-        for tag in dict.fromkeys((*self.unread, *self.unwritten)):
+        asked, self.refused = self.refused, {}
+        for tag in asked:
             try:
                 self.nodes[tag] = node_id(tag, spaces)
             except InputError as error:
-                for refused in (self.unread, self.unwritten):
-                    if tag in refused:
-                        refused[tag] = error.what
-        for tag in [one for one in self._written if one in self.unwritten and one in self.nodes]:
+                self.refused[tag] = error.what
+        there = asked.keys() - self.refused.keys()
+        for tag in (one for one in self._written if one in there and one not in self.kinds):
             first = self._writers.setdefault(self.nodes[tag], tag)
-            if first == tag:
-                await self._find_kind(tag)
-            else:  # two spellings of one node, which only the server can tell
-                self.unwritten[tag] = f"is the node of {first}, which is written already"
+            # Of two spellings of one node only the server can tell.
+            twice = f"is the node of {first}, which is written already"
+            why = await self._find_kind(tag) if first == tag else twice
+            if why:
+                self.refused[tag] = why
+        await self._subscribe(
+            subscription, [t for t in self._read if t in there - self._heard], interval
+        )
 
-    async def _find_kind(self, tag: str) -> None:
+    async def _find_kind(self, tag: str) -> str:
+        """Note the type of number that a written tag takes; return why it is refused, if it is."""
         from asyncua import ua
 
         try:
@@ -75,20 +78,16 @@ class ServerTags:
         except ua.UaError as error:
             if not is_open(self._client):
                 raise
-            self.unwritten[tag] = refusal(error)
-            return
+            return refusal(error)
         use = self._written[tag]
-        if kind.name in FITTING[use]:
-            self.kinds[tag] = kind
-            del self.unwritten[tag]
-        else:
-            self.unwritten[tag] = f"is of type {kind.name}, and {NEEDS[use]}"
+        if kind.name not in FITTING[use]:
+            return f"is of type {kind.name}, and {NEEDS[use]}"
+        self.kinds[tag] = kind
+        return ""
 
-    async def subscribe(self, subscription: Any, interval: float) -> None:
-        """Subscribe to what is not subscribed yet, sampled every ``interval`` ms."""
+    async def _subscribe(self, subscription: Any, tags: list[str], interval: float) -> None:
         from asyncua import ua
 
-        tags = [tag for tag in self.unread if tag in self.nodes]
         if not tags:
             return
         for tag in tags:
@@ -100,9 +99,9 @@ class ServerTags:
         )
         for tag, handle in zip(tags, found, strict=True):
             if isinstance(handle, ua.StatusCode):
-                self.unread[tag] = f"is refused ({handle.name})"
+                self.refused[tag] = f"is refused ({handle.name})"
             else:
-                del self.unread[tag]
+                self._heard.add(tag)
 
 
 def refusal(error: Exception) -> str:

@@ -79,7 +79,7 @@ class BridgeRunner:
                     done = (event.order, event.failure, event.seconds, now)
                     self.link.submit(self.bridge.written(*done))
                 elif isinstance(event, Refused):
-                    self.link.submit(self.bridge.refuse(event.read, event.written, now))
+                    self.link.submit(self.bridge.refuse(event.tags, now))
                 else:
                     self.links.append(event)
             now = time.monotonic()

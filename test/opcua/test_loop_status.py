@@ -48,8 +48,8 @@ def test_refused_tags_are_an_error_and_the_first_three_are_named() -> None:
     status = Status()
     plant = status.plant
     names = [PV, *dict(plant.bridge.tags.uses())]
-    plant.do(plant.bridge.refuse({PV: "is refused (BadX)"}, dict.fromkeys(names, "no"), plant.now))
+    plant.do(plant.bridge.refuse(dict.fromkeys(names, "no") | {PV: "is refused (BadX)"}, plant.now))
     level, text, values = status.now()
     assert level == "error"
-    assert text == "tag s=PV is refused (BadX); tag s=REQUEST no; tag s=BEAT no; and 1 more"
+    assert text == "tag s=PV is refused (BadX); tag s=BEAT no; tag s=REQUEST no; and 1 more"
     assert values["refused_tags"] == 4
