@@ -202,7 +202,7 @@ class PlantLink:
 
     async def _session(self, client: "Client") -> str:
         tags = ServerTags(client, *self._tags)
-        self._forget_orders()
+        self._orders = asyncio.Queue()  # what was to be written in a session that is gone is not
         self._heard_at = time.monotonic()
         subscription = await self._subscribe(client)
         await tags.ask(subscription, self._sampling)
@@ -313,13 +313,6 @@ class PlantLink:
         rest = asyncio.create_task(self._orders.join())
         await asyncio.wait((rest, writing), timeout=ANSWER, return_when=asyncio.FIRST_COMPLETED)
         rest.cancel()
-
-    def _forget_orders(self) -> None:
-        """Drop what was to be written in a session that is gone."""
-        while not self._orders.empty():
-            order = self._orders.get_nowait()
-            self._orders.task_done()
-            self._tell(Written(order, "the connection was lost", 0.0))
 
     def _tell(self, event: LinkEvent) -> None:
         self._events.append(event)
