@@ -38,7 +38,6 @@ class OpcuaNode(ManagedNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("opcua", OpcuaNodeSettings, **kwargs)
         self._link: PlantLink | None = None
-        self._woken = False
 
     def configure(self) -> None:
         settings = self.settings
@@ -103,7 +102,7 @@ class OpcuaNode(ManagedNode):
         writing = [bridge.tags for bridge in self.bridges.values() if bridge.rules.writes]
         written = {tag: use for tags in writing for tag, use in tags.uses()}
         settings = dataclasses.replace(self.settings, url=self._url)
-        self._link = PlantLink(settings, tuple(self._by_tag), written, self._wake)
+        self._link = PlantLink(settings, tuple(self._by_tag), written, self._wakeup.trigger)
         self._link.start()
         shortest = min(bridge.period for bridge in self.bridges.values())
         self.every(min(max(shortest / PART, QUICKEST), SLOWEST), "serve", self._serve)
@@ -141,15 +140,8 @@ class OpcuaNode(ManagedNode):
 
     # ---- the plant -------------------------------------------------------------------------
 
-    def _wake(self) -> None:
-        """Called by the link's thread."""
-        if not self._woken:
-            self._woken = True
-            self._wakeup.trigger()
-
     def _serve(self) -> None:
         """Take in what the plant said, publish what is due, write what is to be written."""
-        self._woken = False
         link = self._link
         if link is None:
             return
