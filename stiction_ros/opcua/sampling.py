@@ -100,10 +100,6 @@ class PlantClock:
         """Return the plant's time, ns; None before the first stamp."""
         return max(self._leads) + round(now * self._rate) if self._leads else None
 
-    def forget(self) -> None:
-        """Begin anew."""
-        self._leads.clear()
-
 
 class LoopSampler:
     """Makes samples at every sample time of what tags report when they change.
@@ -219,7 +215,7 @@ class LoopSampler:
         for tag, changes in self._changes.items():
             kept = [dataclasses.replace(one, stamp=0) for one in list(changes)[-1:]]
             self._changes[tag] = deque(kept, maxlen=KEPT)
-        self._clock.forget()
+        self._clock = PlantClock(self._speed)
         self._next = self._closed = None
         self._strays.clear()
         self._followed = 0
