@@ -1,7 +1,6 @@
 """The tuning of a controller as its user writes it, and the design made from it."""
 
 import dataclasses
-import enum
 import functools
 import math
 
@@ -34,13 +33,6 @@ MOVE_SHARES = {"move_weights": 0.1, "embedding_move_weights": 0.01}
 # stem move, %, by which a load is thought to wander in a sample, and below which no measurement is
 # believed: as in the scenario of Example 1
 FINEST = 0.01
-
-
-class Formulations(enum.StrEnum):
-    """Whose embedding and inversion are used."""
-
-    EXACT = "exact"
-    PRINTED = "printed"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -175,9 +167,9 @@ class ControlSettings:
         200, "past samples replayed into a new observer", low=1, high=100_000
     )
     formulation: str = setting(
-        Formulations.EXACT.value,
+        "exact",
         "embedding and inversion of this package, or as the paper prints them",
-        choices=tuple(kind.value for kind in Formulations),
+        choices=("exact", "printed"),
     )
     preset: str = setting(
         WeightPreset.OWN.value,
@@ -319,7 +311,7 @@ class ControlSettings:
 
     def _as_printed(self, design: ControlDesign) -> ControlDesign:
         """Return ``design`` with the paper's own formulations where the settings ask for them."""
-        if Formulations(self.formulation) is Formulations.EXACT:
+        if self.formulation == "exact":
             return design
         printed = self.preset == WeightPreset.PRINTED
         weights = augmented_weights(
