@@ -26,7 +26,6 @@ from stiction_ros.nodes.shared.messages import (
     diagnosis,
     friction_message,
     joint_state,
-    measured_of,
     rows_of,
     to_ns,
     trajectory,
@@ -312,7 +311,8 @@ class ControllerNode(ManagedNode):
             return
         stamp = to_ns(message.header.stamp)
         if not self.is_answered(stamp):
-            self.port.add_pv(time.monotonic(), stamp, measured_of(message, self.model.outputs))
+            pv = values_of(message, self.model.outputs, partly=True)
+            self.port.add_pv(time.monotonic(), stamp, pv)
         self._go()
 
     def _on_sp(self, message: JointState) -> None:

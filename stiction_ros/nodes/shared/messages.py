@@ -46,20 +46,11 @@ def joint_state(stamp: int, names: Sequence[str], values: Iterable[float]) -> Jo
     return message
 
 
-def values_of(message: JointState, names: Sequence[str]) -> FloatArray | None:
-    """Return the values of ``names`` in their order, or None when one is not there."""
-    return picked(message.name, message.position, names)
-
-
-def measured_of(message: JointState, names: Sequence[str]) -> FloatArray | None:
-    """Return the values of ``names``, NaN for those without one; None when no name is there."""
-    values = values_of(message, names)
-    if values is not None:
-        return values
-    if not set(names).intersection(message.name):
-        return None
-    found = dict(zip(message.name, message.position, strict=False))
-    return np.array([found.get(name, np.nan) for name in names], dtype=float)
+def values_of(
+    message: JointState, names: Sequence[str], *, partly: bool = False
+) -> FloatArray | None:
+    """Return the values of ``names`` by :func:`picked`."""
+    return picked(message.name, message.position, names, partly=partly)
 
 
 def friction_message(

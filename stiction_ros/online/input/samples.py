@@ -68,17 +68,16 @@ class PortState:
     counts: Mapping[str, int]  # everything that was refused, late or missing, by reason
 
 
-def picked(tags: Sequence[str], values: Sequence[float], names: Sequence[str]) -> FloatArray | None:
+def picked(
+    tags: Sequence[str], values: Sequence[float], names: Sequence[str], *, partly: bool = False
+) -> FloatArray | None:
     """Return the values of ``names`` in their order, shape (len(names),).
 
     None when one of them is not among the ``tags`` of a message, or the message has another number
-    of ``values`` than tags.
+    of ``values`` than tags. ``partly``: NaN for those, and None when no name is there.
     """
-    if len(tags) != len(values):
+    found = dict(zip(tags, values, strict=False))
+    lacks = len(tags) != len(values) or any(name not in found for name in names)
+    if lacks and not (partly and set(names).intersection(tags)):
         return None
-    if list(tags) == list(names):
-        return np.array(values, dtype=float)
-    found = dict(zip(tags, values, strict=True))
-    if any(name not in found for name in names):
-        return None
-    return np.array([found[name] for name in names], dtype=float)
+    return np.array([found.get(name, np.nan) for name in names], dtype=float)
