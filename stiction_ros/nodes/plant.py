@@ -74,7 +74,7 @@ class PlantNode(ManagedNode):
         whole = MemberLoop("", self.model.valve_names, self.model.outputs)
         self.wiring = Wiring(self.model, loops or [whole])
         self.round_trips = RoundTrips()
-        self._missed = self._repeats = 0
+        self._grid, self._repeats = TickGrid(), 0
         self._shown = time.monotonic()
         self._every = -(-settings.samples // 100)  # a hundred lines of progress
         self._clock_out = self.outlet(Clock, "/clock", SIGNAL_QOS)
@@ -153,7 +153,7 @@ class PlantNode(ManagedNode):
         refused = [r for r in Reception if r not in (Reception.TAKEN, Reception.LATE)]
         keys += [(f"refused_op:{one.value}", counts[one]) for one in refused]
         if self._realtime:
-            keys.append(("missed_ticks", self._missed))
+            keys.append(("missed_ticks", int(self._grid.missed)))
             times = self.round_trips.milliseconds()
             keys += [(f"pv_to_op_ms_{name}", f"{value:.3f}") for name, value in times.items()]
         else:
@@ -209,7 +209,7 @@ class PlantNode(ManagedNode):
 
     def _set_pace(self, speed: float) -> None:
         period = self.model.sample_time / speed
-        self._grid = TickGrid(period, time.monotonic())
+        self._grid.begin(period, time.monotonic())
         self.every(period, "pace", self._tick)
 
     def _tick(self) -> None:
@@ -219,8 +219,7 @@ class PlantNode(ManagedNode):
         before = self._grid.missed
         if self._grid.tick(time.monotonic()):
             self.regular["pace"].reset()
-            if self._grid.missed > before:
-                self._missed += self._grid.missed - before
+            if int(self._grid.missed) > int(before):
                 self.notice("pace", "warn", "the plant is slower than its speed asks for")
         self._advance()
 

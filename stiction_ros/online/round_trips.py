@@ -50,31 +50,25 @@ class TickGrid:
 
     A tick that comes late by more than half a period begins the grid anew, so that whoever
     answers a sample has half a period at least before the next. What is lost that way is not
-    made up for: simulated time falls behind the wall clock, and :attr:`missed` tells by how much.
+    made up for: simulated time falls behind the wall clock.
 
     Attributes:
-        period: between two ticks, s.
-        due: when the next one is, s of the clock that is handed in.
-        behind: by how much the grid has slipped, s.
+        missed: ticks by which it has fallen behind.
     """
 
-    def __init__(self, period: float, now: float) -> None:
-        """Begin at ``now``; ``period`` in the seconds of the same clock."""
-        self.period = period
-        self.due = now + period
-        self.behind = 0.0
+    def __init__(self) -> None:
+        self.missed = 0.0
 
-    @property
-    def missed(self) -> int:
-        """Whole ticks by which the grid has fallen behind."""
-        return int(self.behind / self.period)
+    def begin(self, period: float, now: float) -> None:
+        """Begin anew at ``now``, s; ``period`` in the seconds of the same clock."""
+        self.period, self.due = period, now + period
 
     def tick(self, now: float) -> bool:
         """Take in a tick at ``now``, s; return whether the grid begins anew with it."""
-        late = now - self.due
-        if late <= LATE * self.period:
+        late = (now - self.due) / self.period
+        if late <= LATE:
             self.due += self.period
             return False
-        self.behind += late
+        self.missed += late
         self.due = now + self.period
         return True

@@ -219,13 +219,13 @@ def test_ticks_keep_to_a_grid_of_wall_time_and_missed_ones_are_counted(graph: Gr
     hand = Commander(graph, pace="realtime", speed=50.0)
     node = hand.plant
     grid = node._grid
-    first, begin, behind = node.plant.sample, grid.due, grid.behind
+    first, begin, missed = node.plant.sample, grid.due, grid.missed
     graph.spin_until(lambda: node.plant.sample >= first + 10, "ten samples")
-    wall = grid.due - begin - (grid.behind - behind)
-    assert wall / grid.period == pytest.approx(node.plant.sample - first, abs=1e-6)
+    ticks = (grid.due - begin) / grid.period - (grid.missed - missed)
+    assert ticks == pytest.approx(node.plant.sample - first, abs=1e-6)
     time.sleep(0.2)  # what a callback that takes long does to the executor
-    before, missed = node.plant.sample, node._missed
-    graph.spin_until(lambda: node._missed >= missed + 8, "the ticks that were missed")
+    before, missed = node.plant.sample, grid.missed
+    graph.spin_until(lambda: grid.missed >= missed + 8, "the ticks that were missed")
     assert node.plant.sample <= before + 2
     graph.spin_until(hand.told(b"\x01", "the plant is slower than its speed"), "the warning")
 
