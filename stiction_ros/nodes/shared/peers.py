@@ -1,7 +1,7 @@
 """The partners of a node: who must be there before it begins, what lacks, and who has gone."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from rclpy.duration import Duration
@@ -138,10 +138,13 @@ class Peers:
             usable = [i for i in found if _fit(i.qos_profile, inlet.qos)]
             if inlet.subscription.get_publisher_count() < len(usable):
                 missing.append(f"{topic} (not every publisher is matched)")
-            elif full in self.topics and not usable:
-                missing.append(f"{topic} (nobody publishes it)")
-        own = {self._node.resolve_topic_name(topic) for topic in inlets}
-        return _once([*missing, *self._foreign_topics(own)])
+        own = {publisher.topic_name for publisher in self._node.publishers}
+        missing += [
+            f"{topic} (nobody publishes it)"
+            for topic in self.topics
+            if topic not in own and not self._node.count_publishers(topic)
+        ]
+        return _once(missing)
 
     def unlinked(self, outlets: dict[str, Outlet]) -> list[str]:
         """Return what lacks until all partners are ready and hear; empty when nothing does."""
@@ -204,16 +207,6 @@ class Peers:
         """Return what is said of partners of which something lacks, or who are not there at all."""
         there = set(self._node.get_node_names()) if names else set()
         return [f"{n} ({what if _last(n) in there else 'no such node'})" for n in names]
-
-    def _foreign_topics(self, own: Iterable[str]) -> list[str]:
-        """Return the awaited topics that this node does not use and nobody publishes."""
-        node = self._node
-        used = {*own, *(publisher.topic_name for publisher in node.publishers)}
-        return [
-            f"{topic} (nobody publishes it)"
-            for topic in self.topics
-            if topic not in used and not node.count_publishers(topic)
-        ]
 
 
 def publishers_of(node: Node, topic: str) -> list[str]:
