@@ -22,7 +22,7 @@ from stiction_ros import __version__
 from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared import parameters
 from stiction_ros.nodes.shared.messages import status, to_stamp
-from stiction_ros.nodes.shared.peers import Inlet, Outlet, Patience, Peers, known_as
+from stiction_ros.nodes.shared.peers import Inlet, Outlet, Peers, known_as
 from stiction_ros.online.health import LEVELS, Noticed
 from stiction_ros.settings import changed
 
@@ -57,7 +57,6 @@ class ManagedNode(LifecycleNode):
         self.running = False
         self.stamp = 0
         self.outlets: dict[str, Outlet] = {}
-        self._patience = Patience()
         self.inlets: dict[str, Inlet] = {}
         self.noticed = Noticed(time.monotonic)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -205,8 +204,7 @@ class ManagedNode(LifecycleNode):
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         publisher = self.create_publisher(kind, topic, qos, event_callbacks=quiet)
         waits = qos is SIGNAL_QOS and getattr(self.settings, "pace", "") == "lockstep"
-        patience = self._patience if waits else None
-        self.outlets[topic] = Outlet(publisher, (*readers, "recorder"), qos, patience)
+        self.outlets[topic] = Outlet(publisher, (*readers, "recorder"), qos, waits=waits)
         return self.outlets[topic]
 
     def inlet(
@@ -216,7 +214,7 @@ class ManagedNode(LifecycleNode):
         subscription = self.create_subscription(kind, topic, take, qos)
         self.inlets[topic] = Inlet(subscription, writers, qos)
 
-    def offer(self, name: str, call: Callable[[Any, Any], Any]) -> None:
+    def offer(self, name: str, call: Callable[[], tuple[bool, str]]) -> None:
         """Offer a service that takes nothing and answers whether it was done, and what to say."""
 
         def serve(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

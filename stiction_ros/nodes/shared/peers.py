@@ -19,46 +19,32 @@ PLANTS = ("plant", "opcua")  # nodes that publish pv: the simulated plant, the d
 WATCHER = "recorder"  # reads every topic and commands nothing
 
 
-class Patience:
-    """How long the outlets of a node wait for their readers.
+class Outlet:
+    """A publisher that counts, and knows which nodes must hear its first message.
 
     A writer keeps its last messages alone, so that a reader whose process gets no time for a
-    while loses what is older. In lockstep nothing need be lost: now and then a writer waits until
-    all that it has said was received. A reader that lets it wait in vain, as one that was killed
-    does, is not waited for again before it has received.
+    while loses what is older. In lockstep nothing need be lost: now and then the outlet ``waits``
+    until all was received. A reader that lets it wait in vain, as one that was killed does, is not
+    waited for again before it has received.
     """
 
-    def __init__(self) -> None:
-        self._in_vain = False
-
-    def wait(self, publisher: Publisher) -> None:
-        """Wait until the readers of ``publisher`` have received all that it has said."""
-        seconds = 0.0 if self._in_vain else PATIENCE
-        self._in_vain = not publisher.wait_for_all_acked(Duration(seconds=seconds))
-
-
-class Outlet:
-    """A publisher that counts, and knows which nodes must hear its first message."""
-
     def __init__(
-        self,
-        publisher: Publisher,
-        readers: tuple[str, ...],
-        qos: QoSProfile,
-        patience: Patience | None = None,
+        self, publisher: Publisher, readers: tuple[str, ...], qos: QoSProfile, *, waits: bool
     ) -> None:
         self.publisher = publisher
         self.readers = readers
         self.qos = qos
-        self.patience = patience
+        self.waits = waits
         self.count = 0
+        self._in_vain = False
 
     def publish(self, message: Any) -> None:
         """Publish and count."""
         self.count += 1
         self.publisher.publish(message)
-        if self.patience is not None and self.count % (self.qos.depth // 2) == 0:
-            self.patience.wait(self.publisher)
+        if self.waits and self.count % (self.qos.depth // 2) == 0:
+            patience = Duration(seconds=0.0 if self._in_vain else PATIENCE)
+            self._in_vain = not self.publisher.wait_for_all_acked(patience)
 
 
 class Inlet:
