@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections import Counter
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -22,12 +23,6 @@ LONGEST_GAP = 200  # samples; after a longer one a run begins anew
 KEPT = 5000  # messages of each kind that wait for the others of their sample
 
 
-@dataclasses.dataclass(frozen=True)
-class _Arrived:
-    stamp: int
-    pv: FloatArray
-
-
 class InputPort:
     """Takes in messages as they come and gives samples to work through, oldest first.
 
@@ -45,7 +40,7 @@ class InputPort:
         self._pace = Pace(rules.period)
         self._refused = Succession(standing=rules.lockstep)
         self._applied = AppliedOp(rules.step)
-        self._queue: list[_Arrived] = []
+        self._queue: dict[int, FloatArray] = {}  # PVs by stamp; of several the last one counts
         self._sp_at: dict[int, FloatArray] = {}
         self._dv_at: dict[int, FloatArray | None] = {}
         self._sp: FloatArray | None = None
@@ -70,10 +65,9 @@ class InputPort:
             self.counts["ahead" if stamp > 0 else "stale"] += 1
             return
         self._seen["pv"] = now
-        self._queue.append(_Arrived(stamp, pv))
-        if len(self._queue) > KEPT:
-            del self._queue[0]
+        if len(self._queue) == KEPT and stamp not in self._queue:
             self.counts["overflow"] += 1
+        keep(self._queue, stamp, pv, KEPT)
 
     def add_sp(self, now: float, stamp: int, sp: FloatArray | None) -> None:
         """Take in set-points (p,); None: not every tag is there."""
@@ -119,17 +113,18 @@ class InputPort:
         """Return the samples to work through now, in their order; the last one is answered."""
         if self.rules.lockstep:
             return self._take_one(now)
-        arrived, self._queue = self._queue, []
+        arrived, self._queue = self._queue, {}
         if not arrived:
             return ()
+        last = next(reversed(arrived))
         self._look_at(now)
-        self._pace.show(now, arrived[-1].stamp, self.rules.step)
+        self._pace.show(now, last, self.rules.step)
         if self._begun:
             samples = self._take_newest(now, arrived)
             if self._begun:
                 return samples
         self._waiting += len(arrived)
-        return self._begin(now, arrived[-1])
+        return self._begin(now, last, arrived[last])
 
     def overdue(self, now: float) -> tuple[Sample, ...]:
         """Return samples whose PV should have come by ``now``; ask several times a sample."""
@@ -203,29 +198,26 @@ class InputPort:
 
     # ---- lockstep --------------------------------------------------------------------------
 
-    def _head(self) -> _Arrived | None:
+    def _head(self) -> int | None:
         """Return the oldest sample that has all it needs; incomplete ones before it are lost."""
         if self._begun:
             self._refuse_what_does_not_fit()
-        waiting = sorted(self._queue, key=lambda one: one.stamp)
-        for one in waiting:
-            if self._complete(one.stamp):
-                self._queue = [other for other in self._queue if other.stamp >= one.stamp]
-                return one
-        return None
+        head = min(filter(self._complete, self._queue), default=None)
+        if head is not None:
+            self._queue = {stamp: pv for stamp, pv in self._queue.items() if stamp >= head}
+        return head
 
     def _refuse_what_does_not_fit(self) -> None:
         """Refuse old stamps; far ones too, unless the samples before them are there."""
-        newer = [self._grid.ahead(one.stamp) for one in self._queue]
-        far = min((n for n in newer if n > 0), default=0) > SLACK
-        queue, self._queue = self._queue, []
-        for one, ahead in zip(queue, newer, strict=True):
+        newer = {stamp: self._grid.ahead(stamp) for stamp in self._queue}
+        far = min((n for n in newer.values() if n > 0), default=0) > SLACK
+        for stamp, ahead in newer.items():
             if self._begun and (far or ahead <= 0):
                 self.counts["ahead" if ahead > 0 else "stale"] += 1
-                if not self._refused.add(one.stamp, True):
-                    continue
-                self._end_run()
-            self._queue.append(one)
+                if self._refused.add(stamp, True):
+                    self._end_run()
+                else:
+                    del self._queue[stamp]
 
     def _complete(self, stamp: int) -> bool:
         if self._sp is None or (self.rules.scheduled and stamp not in self._sp_at):
@@ -233,18 +225,15 @@ class InputPort:
         return not self.rules.needs_dv or stamp in self._dv_at
 
     def _take_one(self, now: float) -> tuple[Sample, ...]:
-        head = self._head()
-        if head is None:
+        stamp = self._head()
+        if stamp is None:
             return ()
-        stamp = head.stamp
-        # Of several showings of one sample the last one counts.
-        pv = next(one.pv for one in reversed(self._queue) if one.stamp == stamp)
-        self._queue = [one for one in self._queue if one.stamp != stamp]
+        pv = self._queue.pop(stamp)
         if not self._begun:
-            samples = self._begin(now, _Arrived(stamp, pv))
+            samples = self._begin(now, stamp, pv)
         else:
             self._refused.clear()
-            samples = self._follow(now, {self._grid.ahead(stamp): _Arrived(stamp, pv)})
+            samples = self._follow(now, {self._grid.ahead(stamp): (stamp, pv)})
         for waiting in (self._sp_at, self._dv_at):
             for old in [at for at in waiting if at <= stamp]:
                 del waiting[old]
@@ -259,30 +248,29 @@ class InputPort:
             self._looked = self._awake = now
             self._before = self._pv_number, self._pv_now
 
-    def _take_newest(self, now: float, arrived: list[_Arrived]) -> tuple[Sample, ...]:
+    def _take_newest(self, now: float, arrived: Mapping[int, FloatArray]) -> tuple[Sample, ...]:
         """Return the samples up to the newest that fits; not ``_begun`` after a new run."""
         number, heard = self._pv_number, self._pv_now
         if now - self._awake < AWAKE:
             number, heard = self._before
         since = max(now - heard, 0.0) / self._pace.period
         latest = number - self._grid.number + SLACK + 2.0 * since
-        fitting: dict[int, _Arrived] = {}
-        for ahead, one in sorted(
-            ((self._grid.ahead(one.stamp), one) for one in arrived), key=lambda pair: pair[0]
-        ):
+        fitting: dict[int, tuple[int, FloatArray]] = {}
+        for stamp, pv in sorted(arrived.items(), key=lambda one: one[0]):
+            ahead = self._grid.ahead(stamp)
             if ahead > max(latest, max(fitting, default=0) + SLACK):
                 self.counts["ahead"] += 1
             elif ahead > 0:
-                fitting.setdefault(ahead, one)
+                fitting.setdefault(ahead, (stamp, pv))
             else:
                 late = self._missed.pop(self._grid.number + ahead, False)
                 self.counts["late" if late else "stale"] += 1
         if not fitting:
-            for one in arrived:
+            for stamp in arrived:
                 follows = self._refused.last is None or (
-                    one.stamp - self._refused.last <= (SLACK + 2.0 * since) * self.rules.step
+                    stamp - self._refused.last <= (SLACK + 2.0 * since) * self.rules.step
                 )
-                if self._refused.add(one.stamp, follows or one.stamp < self._grid.stamp):
+                if self._refused.add(stamp, follows or stamp < self._grid.stamp):
                     self._end_run()
                     break
             return ()
@@ -297,38 +285,40 @@ class InputPort:
         self._refused.clear()
         self._begun, self._waiting = False, PATIENCE
 
-    def _begin(self, now: float, one: _Arrived) -> tuple[Sample, ...]:
-        """Begin a run with ``one`` if the OP in force is known or was waited for."""
-        in_force = self._applied.in_force(one.stamp)
+    def _begin(self, now: float, stamp: int, pv: FloatArray) -> tuple[Sample, ...]:
+        """Begin a run with a PV if the OP in force is known or was waited for."""
+        in_force = self._applied.in_force(stamp)
         waits = in_force is None and not self.rules.lockstep and self._waiting < PATIENCE
         if self._sp is None or waits:
             return ()
         self._begun, self._waiting, self._behind = True, 0, 0
         self._refused.clear()
         self._check.forget()
-        self._grid.begin(one.stamp)
-        self._applied.before(one.stamp, True)
+        self._grid.begin(stamp)
+        self._applied.before(stamp, True)
         self._heard(now)
-        return (self._sample(one, one.stamp, True, Given(in_force), begins=True),)
+        return (self._sample(pv, stamp, True, Given(in_force), begins=True),)
 
-    def _follow(self, now: float, fitting: dict[int, _Arrived]) -> tuple[Sample, ...]:
+    def _follow(
+        self, now: float, fitting: Mapping[int, tuple[int, FloatArray]]
+    ) -> tuple[Sample, ...]:
         """Return every sample up to the newest of ``fitting``, by samples ahead of the last."""
         newest = max(fitting)
         missing = newest - len(fitting)
         if missing > LONGEST_GAP:
             self._end_run()
-            return self._begin(now, fitting[newest])
+            return self._begin(now, *fitting[newest])
         self.counts["missing"] += missing
         self.counts["passed over"] += len(fitting) - 1
         self._behind = len(fitting) - 1
         samples = []
         for k in range(1, newest + 1):
-            one = fitting.get(k)
-            if one is None:
+            if k not in fitting:
                 samples.append(self._missing(False))
                 continue
-            self._grid.advance(one.stamp)
-            samples.append(self._sample(one, one.stamp, k == newest, self._given(one.stamp)))
+            stamp, pv = fitting[k]
+            self._grid.advance(stamp)
+            samples.append(self._sample(pv, stamp, k == newest, self._given(stamp)))
         self._heard(now)
         return tuple(samples)
 
@@ -348,18 +338,17 @@ class InputPort:
         self._blind_from = self._taken_at = now
 
     def _sample(
-        self, one: _Arrived | None, stamp: int, answered: bool, given: Given, begins: bool = False
+        self, pv: FloatArray | None, stamp: int, answered: bool, given: Given, begins: bool = False
     ) -> Sample:
-        if one is None:
-            pv = np.full(len(self.rules.instruments), np.nan)
-        else:
-            self.counts["bad values"] += int(np.count_nonzero(~np.isfinite(one.pv)))
-            pv = self._check.measured(stamp / SECOND, one.pv)
-            self.counts["out of range"] += int(np.count_nonzero(np.isfinite(one.pv) & np.isnan(pv)))
+        seen = np.full(len(self.rules.instruments), np.nan)
+        if pv is not None:
+            self.counts["bad values"] += int(np.count_nonzero(~np.isfinite(pv)))
+            seen = self._check.measured(stamp / SECOND, pv)
+            self.counts["out of range"] += int(np.count_nonzero(np.isfinite(pv) & np.isnan(seen)))
         # An OP that stays in force while samples are passed over answers none of them.
         self._in_time = answered
         assert self._sp is not None
         sp, dv = self._sp, self._dv
         if self.rules.lockstep:
             sp, dv = self._sp_at.get(stamp, sp), self._dv_at.get(stamp)
-        return Sample(self._grid.number, stamp, pv, sp, dv, answered, begins, given)
+        return Sample(self._grid.number, stamp, seen, sp, dv, answered, begins, given)
