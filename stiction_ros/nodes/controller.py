@@ -78,7 +78,7 @@ class ControllerNode(ManagedNode):
                 needs_dv=bool(measured),
             )
         )
-        self._port_health = PortHealth(lockstep)
+        self._port_health = PortHealth(self.port)
         self.fits: dict[int, str] = {}  # end of window -> valid_from of the model in force
         self.models = {""}  # valid_from of the models that have come
         self.reading: deque[Future[LoopModel]] = deque()
@@ -137,7 +137,7 @@ class ControllerNode(ManagedNode):
         now = time.monotonic()
         age = "" if self._sent_at is None else f"{now - self._sent_at:.3f}"
         last = [] if self._result is None else diagnosis(self._result)
-        values = [("sample", self.port.next), ("op_age", age), *keys(self.port.state(now)), *last]
+        values = [("sample", self.port.next), ("op_age", age), *keys(self.port, now), *last]
         return "ok", "running", values
 
     # ---- the step --------------------------------------------------------------------------
@@ -171,8 +171,7 @@ class ControllerNode(ManagedNode):
 
     def look(self) -> None:
         now = time.monotonic()
-        state = self.port.state(now)
-        for notice in self._port_health.look(state, now - self._running_since):
+        for notice in self._port_health.look(now, now - self._running_since):
             self.notice(*notice)
         if self._looks % LOOKS == 0 and len(names := publishers_of(self, "op")) > 1:
             self.notice("commanders", "error", f"op is published by {', '.join(sorted(names))}")

@@ -251,7 +251,7 @@ def test_without_a_set_point_the_node_says_so(bench: Bench) -> None:
         bench.clock.now += 1.0
         bench.send("op_applied", k - 1, 50.0)
         bench.send("pv", k, 50.0)
-        bench.graph.spin_until(lambda k=k: bench.node.port._waiting == k, "pv")
+        bench.graph.spin_until(lambda k=k: bench.node.port.waiting == k, "pv")
     told = bench.status()
     assert (told.level, bench.op) == (ERROR, [])
     assert "sp lacks" in told.message

@@ -10,7 +10,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.online.input.op_port import AppliedOp, Given
 from stiction_ros.online.input.sample_grid import Pace, SampleGrid, Succession, keep
-from stiction_ros.online.input.samples import PortRules, PortState, Sample, SetPointPreview
+from stiction_ros.online.input.samples import PortRules, Sample, SetPointPreview
 from stiction_ros.online.input.signal_check import SignalCheck
 
 SECOND = 1e9
@@ -28,6 +28,11 @@ class InputPort:
 
     In realtime the newest sample is answered and older ones are passed over; in lockstep every
     sample is answered in its turn. Nothing that arrives can stop what comes after it.
+
+    Attributes:
+        counts: everything that was refused, late or missing, by reason.
+        behind: samples that had to be passed over for the newest at the last look.
+        waiting: PVs that came while no run could begin.
     """
 
     def __init__(self, rules: PortRules) -> None:
@@ -48,7 +53,7 @@ class InputPort:
         self._missed: dict[int, bool] = {}  # numbers of samples whose PV may still come
         self._seen: dict[str, float] = {}
         self._begun = False
-        self._waiting = self._behind = 0
+        self.waiting = self.behind = 0
         self._pv_number, self._pv_now, self._blind_from = -1, 0.0, 0.0
         self._taken_at, self._in_time = 0.0, True
         self._looked: float | None = None
@@ -123,7 +128,7 @@ class InputPort:
             samples = self._take_newest(now, arrived)
             if self._begun:
                 return samples
-        self._waiting += len(arrived)
+        self.waiting += len(arrived)
         return self._begin(now, last, arrived[last])
 
     def overdue(self, now: float) -> tuple[Sample, ...]:
@@ -162,7 +167,7 @@ class InputPort:
         self._refused.clear()
         self._looked = None
         if not self.rules.lockstep:
-            self._begun, self._waiting = False, 0
+            self._begun, self.waiting = False, 0
 
     def retune(self, period: float) -> None:
         """Take samples to be ``period`` s apart by the receiver's clock."""
@@ -182,19 +187,21 @@ class InputPort:
         """Return the stamp of a sample of the present run, ns."""
         return self._grid.stamp_of(number)
 
-    def state(self, now: float) -> PortState:
-        """Return how fresh everything is."""
-        lacks = ""
-        if not self._begun:
-            lacks = "sp" if self._sp is None else "op_applied"
-        return PortState(
-            {topic: now - seen for topic, seen in self._seen.items()},
-            0.0 if self.rules.lockstep else self._pace.period,
-            self._behind,
-            self._waiting,
-            lacks,
-            dict(self.counts),
-        )
+    def ages(self, now: float) -> dict[str, float]:
+        """Return s since the last good message of each topic; what never came is left out."""
+        return {topic: now - seen for topic, seen in self._seen.items()}
+
+    @property
+    def period(self) -> float:
+        """A sample, s by the receiver's clock; 0 in lockstep."""
+        return 0.0 if self.rules.lockstep else self._pace.period
+
+    @property
+    def lacks(self) -> str:
+        """What a run lacks to begin: ``sp``, ``op_applied`` or nothing."""
+        if self._begun:
+            return ""
+        return "sp" if self._sp is None else "op_applied"
 
     # ---- lockstep --------------------------------------------------------------------------
 
@@ -283,15 +290,15 @@ class InputPort:
         """Let a run begin with the next sample; enough of them have been waited for already."""
         self.counts["new runs"] += 1
         self._refused.clear()
-        self._begun, self._waiting = False, PATIENCE
+        self._begun, self.waiting = False, PATIENCE
 
     def _begin(self, now: float, stamp: int, pv: FloatArray) -> tuple[Sample, ...]:
         """Begin a run with a PV if the OP in force is known or was waited for."""
         in_force = self._applied.in_force(stamp)
-        waits = in_force is None and not self.rules.lockstep and self._waiting < PATIENCE
+        waits = in_force is None and not self.rules.lockstep and self.waiting < PATIENCE
         if self._sp is None or waits:
             return ()
-        self._begun, self._waiting, self._behind = True, 0, 0
+        self._begun, self.waiting, self.behind = True, 0, 0
         self._refused.clear()
         self._check.forget()
         self._grid.begin(stamp)
@@ -310,7 +317,7 @@ class InputPort:
             return self._begin(now, *fitting[newest])
         self.counts["missing"] += missing
         self.counts["passed over"] += len(fitting) - 1
-        self._behind = len(fitting) - 1
+        self.behind = len(fitting) - 1
         samples = []
         for k in range(1, newest + 1):
             if k not in fitting:

@@ -3,7 +3,7 @@
 from collections import Counter
 
 from stiction_ros.online.health import Notice, stopped_after
-from stiction_ros.online.input.samples import PortState
+from stiction_ros.online.input.port import InputPort
 
 WAITING = 3  # PVs after which a run should have begun
 LOCKSTEP = 5.0  # s: a plant in lockstep shows its sample again every second
@@ -32,43 +32,43 @@ SAID = {
 class PortHealth:
     """Says at each look what is wrong now, or has happened since the last look."""
 
-    def __init__(self, lockstep: bool) -> None:
-        """Begin to count; ``lockstep`` knows no period."""
-        self._lockstep = lockstep
+    def __init__(self, port: InputPort) -> None:
+        """Begin to count; in lockstep no period is known."""
+        self._port = port
         self._before: Counter[str] = Counter()
 
-    def look(self, state: PortState, running: float) -> list[Notice]:
+    def look(self, now: float, running: float) -> list[Notice]:
         """Return what to notice; what never came is as old as the node, ``running`` s."""
-        found = []
-        longest = LOCKSTEP if self._lockstep else stopped_after(state.period)
-        age = min(state.ages.get("pv", running), running)
+        found, port, ages = list[Notice](), self._port, self._port.ages(now)
+        longest = stopped_after(port.period) if port.period else LOCKSTEP
+        age = min(ages.get("pv", running), running)
         if age > longest:
             found.append(Notice("pv", "error", f"no pv for {age:.1f} s"))
-        elif state.lacks and state.waiting >= WAITING:
-            found.append(Notice("start", "error", f"nothing is stepped, {state.lacks} lacks"))
-        told = state.ages.get("op_applied")
+        elif port.lacks and port.waiting >= WAITING:
+            found.append(Notice("start", "error", f"nothing is stepped, {port.lacks} lacks"))
+        told = ages.get("op_applied")
         if told is not None and told > longest >= age:
             found.append(Notice("op_applied", "warn", f"no op_applied for {told:.1f} s"))
-        if state.behind:
-            found.append(Notice("behind", "warn", f"{state.behind} samples behind"))
-        grown = Counter(state.counts) - self._before
-        self._before = Counter(state.counts)
+        if port.behind:
+            found.append(Notice("behind", "warn", f"{port.behind} samples behind"))
+        grown = port.counts - self._before
+        self._before = Counter(port.counts)
         found += [
-            Notice(reason, "warn", f"{SAID[reason]}: {state.counts[reason]}")
+            Notice(reason, "warn", f"{SAID[reason]}: {port.counts[reason]}")
             for reason in SAID
             if grown[reason]
         ]
         return found
 
 
-def keys(state: PortState) -> list[tuple[str, object]]:
-    """Return ages and counts as the keys and values of a status."""
-    ages: list[tuple[str, object]] = []
+def keys(port: InputPort, now: float) -> list[tuple[str, object]]:
+    """Return ages and counts of a port as the keys and values of a status."""
+    ages, seen = list[tuple[str, object]](), port.ages(now)
     for topic in ("pv", "sp", "op_applied"):
-        age = state.ages.get(topic)
+        age = seen.get(topic)
         ages.append((f"{topic}_age", "" if age is None else f"{age:.3f}"))
-        if state.period:
-            samples = "" if age is None else f"{age / state.period:.1f}"
+        if port.period:
+            samples = "" if age is None else f"{age / port.period:.1f}"
             ages.append((f"{topic}_age_samples", samples))
-    counts = [(reason.replace(" ", "_"), state.counts.get(reason, 0)) for reason in SAID]
-    return [*ages, ("samples_behind", state.behind), *counts]
+    counts = [(reason.replace(" ", "_"), port.counts[reason]) for reason in SAID]
+    return [*ages, ("samples_behind", port.behind), *counts]

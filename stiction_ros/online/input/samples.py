@@ -1,7 +1,7 @@
 """Samples as a controller works through them, and the rules by which they come about."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -54,18 +54,6 @@ class Sample:
     answered: bool  # whether it is stepped; otherwise it is passed over
     begins: bool  # whether a run begins with it; ``given`` is then the OP in force, if known
     given: Given  # what the valves were given at the sample before
-
-
-@dataclasses.dataclass(frozen=True)
-class PortState:
-    """How fresh everything is."""
-
-    ages: Mapping[str, float]  # s since the last good message; what never came is left out
-    period: float  # s that a sample takes by the receiver's clock; 0 in lockstep
-    behind: int  # samples that had to be passed over for the newest at the last look
-    waiting: int  # PVs that came while no run could begin
-    lacks: str  # what a run lacks to begin: ``sp``, ``op_applied`` or nothing
-    counts: Mapping[str, int]  # everything that was refused, late or missing, by reason
 
 
 def picked(

@@ -372,7 +372,7 @@ def test_a_run_waits_for_the_op_in_force_but_not_for_ever() -> None:
     for k in range(1, PATIENCE):
         feed.event(k, "pv", k)
         assert feed.samples == []
-        assert feed.port.state(k).lacks == "op_applied"
+        assert feed.port.lacks == "op_applied"
     feed.event(PATIENCE, "pv", PATIENCE)
     (sample,) = feed.samples
     assert sample.begins
@@ -395,7 +395,7 @@ def test_without_a_set_point_nothing_is_stepped_and_it_is_said() -> None:
     for k in range(1, 9):
         feed.event(k, "applied", k - 1)
         feed.event(k, "pv", k)
-    state = feed.port.state(8)
+    state = feed.port
     assert (feed.samples, state.lacks, state.waiting) == ([], "sp", 8)
     feed.event(8.5, "sp", 0)
     feed.event(9, "applied", 8)
@@ -446,11 +446,11 @@ def test_ages_and_samples_behind() -> None:
     for k in (3, 4):
         feed.event(5, "queued", k)
     feed.event(5, "pv", 5)
-    state = feed.port.state(7.0)
-    assert state.ages == {"pv": 2.0, "sp": 7.0, "op_applied": 7.0}
+    state = feed.port
+    assert state.ages(7.0) == {"pv": 2.0, "sp": 7.0, "op_applied": 7.0}
     assert (state.behind, state.period) == (2, 1.0)
     feed.event(8, "pv", 8)
-    assert feed.port.state(8.0).behind == 0
+    assert feed.port.behind == 0
 
 
 def test_a_pace_that_was_set_wrong_is_found_out() -> None:

@@ -1,66 +1,64 @@
-from typing import Any
+from collections import Counter
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
+from stiction_ros.online.input.port import InputPort
 from stiction_ros.online.input.port_health import PortHealth, keys
-from stiction_ros.online.input.samples import PortState
 
 
-def state(**changed: Any) -> PortState:
-    usual: dict[str, Any] = {
-        "ages": {"pv": 0.1, "sp": 0.1, "op_applied": 0.1},
-        "period": 1.0,
-        "behind": 0,
-        "waiting": 0,
-        "lacks": "",
-        "counts": {},
-    }
-    return PortState(**(usual | changed))
+def port(**changed: Any) -> InputPort:
+    """Return what is asked of a port; ``ages`` are those at any time."""
+    usual: dict[str, Any] = {"ages": {"pv": 0.1, "sp": 0.1, "op_applied": 0.1}}
+    usual |= {"period": 1.0, "behind": 0, "waiting": 0, "lacks": "", "counts": {}}
+    told = SimpleNamespace(**(usual | changed))
+    told.ages, told.counts = (lambda ages: lambda _now: ages)(told.ages), Counter(told.counts)
+    return cast("InputPort", told)
 
 
-# state, s since the node runs -> names and levels
-TABLE: dict[str, tuple[PortState, float, list[tuple[str, str]]]] = {
-    "well": (state(), 100.0, []),
-    "no pv": (state(ages={"pv": 3.1}), 100.0, [("pv", "error")]),
-    "pv a little late": (state(ages={"pv": 2.9}), 100.0, []),
-    "fast samples have half a second": (state(ages={"pv": 0.4}, period=0.01), 100.0, []),
-    "and no more": (state(ages={"pv": 0.6}, period=0.01), 100.0, [("pv", "error")]),
-    "no pv ever": (state(ages={}), 3.1, [("pv", "error")]),
-    "just begun": (state(ages={}), 0.1, []),
-    "just begun again": (state(ages={"pv": 60.0}), 0.1, []),
-    "no sp ever": (state(lacks="sp", waiting=3), 9.0, [("start", "error")]),
-    "the first samples": (state(lacks="sp", waiting=2), 9.0, []),
+# port, s since the node runs -> names and levels
+TABLE: dict[str, tuple[InputPort, float, list[tuple[str, str]]]] = {
+    "well": (port(), 100.0, []),
+    "no pv": (port(ages={"pv": 3.1}), 100.0, [("pv", "error")]),
+    "pv a little late": (port(ages={"pv": 2.9}), 100.0, []),
+    "fast samples have half a second": (port(ages={"pv": 0.4}, period=0.01), 100.0, []),
+    "and no more": (port(ages={"pv": 0.6}, period=0.01), 100.0, [("pv", "error")]),
+    "no pv ever": (port(ages={}), 3.1, [("pv", "error")]),
+    "just begun": (port(ages={}), 0.1, []),
+    "just begun again": (port(ages={"pv": 60.0}), 0.1, []),
+    "no sp ever": (port(lacks="sp", waiting=3), 9.0, [("start", "error")]),
+    "the first samples": (port(lacks="sp", waiting=2), 9.0, []),
     "nobody tells any more": (
-        state(ages={"pv": 0.1, "op_applied": 4.0}),
+        port(ages={"pv": 0.1, "op_applied": 4.0}),
         100.0,
         [("op_applied", "warn")],
     ),
-    "nobody ever told": (state(ages={"pv": 0.1}), 100.0, []),
-    "behind": (state(behind=7), 100.0, [("behind", "warn")]),
+    "nobody ever told": (port(ages={"pv": 0.1}), 100.0, []),
+    "behind": (port(behind=7), 100.0, [("behind", "warn")]),
 }
 
 
 @pytest.mark.parametrize("case", TABLE)
 def test_what_is_noticed(case: str) -> None:
     found, running, noticed = TABLE[case]
-    look = PortHealth(lockstep=False).look(found, running)
+    look = PortHealth(found).look(0.0, running)
     assert [(name, level) for name, level, _ in look] == noticed
 
 
 def test_lockstep_knows_no_period() -> None:
-    health = PortHealth(lockstep=True)
-    assert health.look(state(ages={"pv": 4.9}, period=0.0), 100.0) == []
-    assert [n.level for n in health.look(state(ages={"pv": 5.1}, period=0.0), 100.0)] == ["error"]
+    for age, levels in ((4.9, []), (5.1, ["error"])):
+        health = PortHealth(port(ages={"pv": age}, period=0.0))
+        assert [notice.level for notice in health.look(0.0, 100.0)] == levels
 
 
 def test_what_was_counted_is_noticed_once() -> None:
-    health = PortHealth(lockstep=False)
-    assert [n.name for n in health.look(state(counts={"stale": 2, "late": 1}), 9.0)] == [
-        "stale",
-        "late",
-    ]
-    assert health.look(state(counts={"stale": 2, "late": 1}), 9.0) == []
-    (again,) = health.look(state(counts={"stale": 3, "late": 1}), 9.0)
+    counted = port(counts={"stale": 2, "late": 1})
+    health = PortHealth(counted)
+    assert [notice.name for notice in health.look(0.0, 9.0)] == ["stale", "late"]
+    assert health.look(0.0, 9.0) == []
+    counted.counts["stale"] = 3
+    (again,) = health.look(0.0, 9.0)
     assert (again.name, again.level, again.text) == (
         "stale",
         "warn",
@@ -69,7 +67,7 @@ def test_what_was_counted_is_noticed_once() -> None:
 
 
 def test_keys_tell_ages_in_seconds_and_samples_and_all_counts() -> None:
-    told = dict(keys(state(ages={"pv": 0.5}, period=0.1, counts={"late op": 2})))
+    told = dict(keys(port(ages={"pv": 0.5}, period=0.1, counts={"late op": 2}), 0.0))
     assert told["pv_age"] == "0.500"
     assert told["pv_age_samples"] == "5.0"
     assert told["sp_age"] == ""
