@@ -56,13 +56,6 @@ _name = _text(r"[A-Za-z][A-Za-z0-9_]*", "name", "use letters, digits and _")
 _node = _text(r"(ns=\d+;|nsu=[^;]+;)?[isgb]=.+", "node id", "write ns=2;s=FIC101.PV")
 
 
-def _rising(section: Section, key: str) -> tuple[float, ...]:
-    limits = section.numbers(key, count=2)
-    if not limits[0] < limits[1]:
-        raise InputError("are not rising", where=section.at(key), fix="write [low, high]")
-    return tuple(limits.tolist())
-
-
 def _modes(section: Section, key: str) -> tuple[str, ...]:
     modes = section.raw(key)
     if not isinstance(modes, list) or not modes:
@@ -87,7 +80,7 @@ class ValveTags:
     op_read: str = _said(_node)  # tag of the OP in force, %
     op: str = _said(_node, "")  # tag that a remote OP is written to, %; empty: nothing is written
     mode: str = _said(_node, "")  # tag of the mode of its controller; empty where it is not known
-    limits: tuple[float, float] = _said(_rising, (0.0, 100.0))  # of what may be written, %
+    limits: tuple[float, float] = _said(Section.ends, (0.0, 100.0))  # of what may be written, %
     # largest change of what is written, % per second of the plant's time
     rate: float = _said(lambda section, key: section.number(key, above=0.0), 1.0)
     low: str = _said(_node, "")  # low, high: tags of limits that the plant sets, %; empty for none
