@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 
+from stiction_ros.discrepancy.simulation.between import beyond_samples
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Axis, Behaviour, FloatArray, Seen, about
 from stiction_ros.effects.behaviour import BoolArray
@@ -252,15 +253,13 @@ def spans_of(figures: Sequence[Mapping[str, float]]) -> dict[str, tuple[float, f
 
 
 LEAST_LAG = 2.5  # times the shortest lag that is searched, a fifth of a sample
-QUARTER = 0.25
-"""Of a sample: the mean of the stem over a sample lies between its end and its middle."""
 
 
 class Lagging(Candidate):
-    """A lag by its time constant, where it begins, and how late within a sample it moves on."""
+    """A lag by its time constant, where it begins, and how far it goes on between samples."""
 
     def count(self, point: FloatArray) -> int:
-        """Return how many figures count: not where it begins, but how late it moves."""
+        """Return how many figures count: not where it begins, but how far it goes on."""
         return max(len(point) - 1, 1)
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
@@ -270,12 +269,28 @@ class Lagging(Candidate):
         """
         return float(point[0]) >= LEAST_LAG * self.axes[0].low
 
-    def late(self, values: FloatArray, points: FloatArray, run: FreeRun) -> FloatArray:
-        """Return signals, shape (N, G), as late within a sample as the points say, if they do."""
-        for share in points[:, 2:].T:
-            for rows in run.runs.slices:
-                values[rows][1:] -= (QUARTER + share) * np.diff(values[rows], axis=0)
-        return values
+    def between(
+        self, run: FreeRun, points: FloatArray, output: int, valve: int | None = None
+    ) -> FloatArray:
+        """Return what goes on between samples, shape (N, G), as far as the points say, if they do.
+
+        Args:
+            run: of the current model.
+            points: shape (G, axes).
+            output: index of the output.
+            valve: index of the valve that is slow; None for the process and the sensor.
+        """
+        if points.shape[1] < 3:
+            return np.zeros((len(run.runs), 1))
+        if (output, valve) not in run.beyond:
+            from scipy.interpolate import CubicSpline  # slow to import
+
+            axis = self.axes[0]
+            lags = axis.outer(axis.grid())
+            found = beyond_samples(run, output, lags, valve)
+            run.beyond[output, valve] = CubicSpline(np.log(lags), found, axis=1)
+        share = 0.5 + points[:, 2]
+        return np.asarray(share * run.beyond[output, valve](np.log(points[:, 0])))
 
 
 def lag_axis(run: FreeRun) -> Axis:
@@ -284,6 +299,9 @@ def lag_axis(run: FreeRun) -> Axis:
     return Axis(0.2 * step, max(len(run.runs) / 8.0, 2.0) * step, 20, logarithmic=True)
 
 
-def late_axes(asked: bool) -> tuple[Axis, ...]:
-    """Return the axis of how late within a sample a lag moves on; none where that is not asked."""
-    return (Axis(-QUARTER, QUARTER, 1, linear=True),) if asked else ()
+def between_axes(asked: bool) -> tuple[Axis, ...]:
+    """Return the axis of how far a lag goes on between samples; none where that is not asked.
+
+    From -½, a lag that acts on the samples alone, as in loop models, to ½, that of a plant.
+    """
+    return (Axis(-0.5, 0.5, 1, linear=True),) if asked else ()

@@ -12,8 +12,8 @@ from stiction_ros.discrepancy.candidate.base import (
     KindCandidate,
     Lagging,
     Response,
+    between_axes,
     lag_axis,
-    late_axes,
 )
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end
 from stiction_ros.effects import (
@@ -67,7 +67,7 @@ class FilterCandidate(KindCandidate, OutputCandidate):
             step = run.runs.sample_time
             start = self.starts(points, float(values[0]))
             parts.append(self.kind.simulate_grid(self.rows(points), values, start, step))
-        response = self.late(end_to_end(parts), points, run)
+        response = end_to_end(parts)
         response -= run.forced[:, self.output, None]
         return Response({self.output: response})
 
@@ -75,16 +75,16 @@ class FilterCandidate(KindCandidate, OutputCandidate):
         """Return what the filters rest at before the first sample, shape (G,)."""
         return np.full(len(points), first)
 
-    def late(self, values: FloatArray, points: FloatArray, run: FreeRun) -> FloatArray:
-        """Return the outputs of the filters, shape (N, G), as late as they come."""
-        return values
-
     def rows(self, points: FloatArray) -> FloatArray:
         return points[:, :1]
 
 
 class PoleCandidate(Lagging, FilterCandidate):
     """One more lag of the output."""
+
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
+        shifts = super().answer(run, points).shifts
+        return Response({i: v + self.between(run, points, i) for i, v in shifts.items()})
 
     def starts(self, points: FloatArray, first: float) -> FloatArray:
         return first + points[:, 1]
@@ -135,7 +135,7 @@ def output_candidates(run: FreeRun) -> list[Candidate]:
         found += [
             GainCandidate(place=f"process:{tag}", effect=ProcessGain.effect, output=i),
             PoleCandidate.of(
-                run, i, ExtraPole, (lag_axis(run), start, *late_axes(any(run.runs.between)))
+                run, i, ExtraPole, (lag_axis(run), start, *between_axes(any(run.runs.between)))
             ).or_else(f"sensor:{tag}", Lag.effect),
             FilterCandidate.of(run, i, ExtraDelay, (delays,)),
         ]

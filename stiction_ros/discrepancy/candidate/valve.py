@@ -11,8 +11,8 @@ from stiction_ros.discrepancy.candidate.base import (
     KindCandidate,
     Lagging,
     Response,
+    between_axes,
     lag_axis,
-    late_axes,
 )
 from stiction_ros.discrepancy.measures import ROUNDING
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
@@ -181,9 +181,11 @@ class BacklashCandidate(OneFigure):
 class LagCandidate(Lagging, OneFigure):
     """A lag of the stem."""
 
-    def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
-        stems = super().stems(run, points, from_measured=from_measured)
-        return self.late(stems, points, run)
+    def answer(self, run: FreeRun, points: FloatArray) -> Response:
+        shifts = super().answer(run, points).shifts
+        return Response(
+            {i: v + self.between(run, points, i, self.valve) for i, v in shifts.items()}
+        )
 
     def lead(self, point: FloatArray) -> float:
         return float(point[1])
@@ -292,7 +294,7 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     lower, upper = np.quantile(op, [0.95, 0.05]).tolist()
     start = Axis(-1.0, 1.0, 1)
     away = Axis(-2.0 * span, 2.0 * span, 1, linear=True)
-    late = late_axes(any(run.runs.between[j : j + 1]))
+    between = between_axes(any(run.runs.between[j : j + 1]))
 
     def sizes(least: float, most: float, count: int) -> Axis:
         return Axis(least, most, count, logarithmic=True)
@@ -310,7 +312,7 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
         StictionCandidate.at(run, j, XchStiction, rough),
         BacklashCandidate.at(run, j, Backlash, bands),
         SlewCandidate.at(run, j, Slew, rates, reach=span),
-        LagCandidate.at(run, j, Lag, (lag_axis(run), away, *late)),
+        LagCandidate.at(run, j, Lag, (lag_axis(run), away, *between)),
         SaturationCandidate.at(run, j, Saturation, ends, limits=limits),
         ValveCandidate.at(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),
         CubicCandidate.at(run, j, CubicCharacteristic, bends, low=low, high=high),

@@ -16,13 +16,13 @@ from stiction_ros.discrepancy.decision.explanation import (
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.least_squares import left_by
 from stiction_ros.discrepancy.measures import GAUSS_NEWTON, MARGIN, NEARLY_ALL, NORMAL, ROUNDING
-from stiction_ros.discrepancy.process.slower import GAIN, Changeable
+from stiction_ros.discrepancy.process.slower import GAIN, Changeable, with_equation
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, Process
+from stiction_ros.processes import ArxProcess
 from stiction_ros.signals.autoregression import whiten
 
 TINY_STEP = 0.02  # of the probes, at which it has settled
@@ -228,7 +228,7 @@ class _Search:
         for k, each in enumerate(np.eye(len(self.free))):
             if self.free[k]:
                 equation = self.equation.changed(self.values + self.probes * each)
-                other = _with_equation(
+                other = with_equation(
                     run.model.process, self.output, equation, run.runs.sample_time
                 )
                 moved.append((run.gap_behind(other, self.output) - gap) / self.probes[k])
@@ -270,13 +270,3 @@ class _Search:
                 ProcessChange(name, own.what, value, (low, high), "s" if late else "1", model)
             )
         return found
-
-
-def _with_equation(process: Process, output: int, own: ArxOutput, sample_time: float) -> Process:
-    """Return an ARX process with another equation of one output, behind its effects if any."""
-    if isinstance(process, AlteredProcess):
-        inner = _with_equation(process.inner, output, own, sample_time)
-        return AlteredProcess(inner, process.effects, sample_time)
-    assert isinstance(process, ArxProcess)
-    equations = (*process.equations[:output], own, *process.equations[output + 1 :])
-    return ArxProcess(equations, process.valves, process.model.stem0, process.model.pv0)

@@ -1,6 +1,7 @@
 """What of an equation may be a few per cent off: gain, time constants, leads, dead time."""
 
 import dataclasses
+import functools
 import math
 from collections.abc import Mapping
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.discrepancy.measures import ROUNDING
 from stiction_ros.effects import FloatArray
-from stiction_ros.processes import ArxOutput
+from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, Process
 from stiction_ros.processes.sampled import pulses
 
 FRACTIONS = 41  # of a sample, at which the dead time's is looked for
@@ -34,11 +35,12 @@ class Held:
         return np.asarray(_answers(self.poles, self.fraction) @ self.numerator)
 
 
-def held(denominator: FloatArray, b: FloatArray) -> Held | None:
+@functools.lru_cache(maxsize=100)
+def held(denominator: tuple[float, ...], b: tuple[float, ...]) -> Held | None:
     """Return the continuous plant whose sampled equation is given; None where none is.
 
     Args:
-        denominator: 1, a₁, …, shape (n + 1,), its roots off the negative axis and not 0.
+        denominator: 1, a₁, …, n + 1 of them, its roots off the negative axis and not 0.
         b: one more than n at most.
     """
     roots = np.roots(denominator).astype(complex)
@@ -48,7 +50,7 @@ def held(denominator: FloatArray, b: FloatArray) -> Held | None:
     if np.any((roots.real < 0.0) & (np.abs(roots.imag) < ROUNDING)):
         return None
     poles = np.log(np.where(np.abs(roots - 1.0) < ROUNDING, 1.0, roots))
-    wanted = np.concatenate([b, np.zeros(count + 1 - len(b))])
+    wanted = np.array([*b, *[0.0] * (count + 1 - len(b))])
 
     def left(fraction: float) -> float:
         return _solved(poles, fraction, wanted)[1]
@@ -162,8 +164,8 @@ class Changeable:
     def __init__(self, own: ArxOutput) -> None:
         """Take the equation."""
         self.own = own
-        denominator = np.array([1.0, *own.a])
-        plants = {valve: held(denominator, np.array(b)) for valve, b in own.b.items()}
+        denominator = (1.0, *own.a)
+        plants = {valve: held(denominator, tuple(b)) for valve, b in own.b.items()}
         known = {valve: plant for valve, plant in plants.items() if plant is not None}
         self._plants = known if len(known) == len(plants) else {}
         self._poles = np.roots(denominator).astype(complex)
@@ -195,6 +197,20 @@ class Changeable:
             b[valve] = gain * other.sampled()
             delays[valve] = max(delay + more, 0)
         return self._with(np.real(np.poly(poles))[1:], b, delays)
+
+    def lagged(self, lag: float, slow: str | None = None) -> ArxOutput | None:
+        """Return the equation of the plant behind one more lag; None where no plant is known.
+
+        Args:
+            lag: time constant, samples.
+            slow: the valve that it is of; None for the process and the sensor, which slow all.
+        """
+        poles, b = np.append(self._poles, math.exp(-1.0 / lag)), {}
+        for valve, plant in self._plants.items():
+            above = [1.0 / lag, 0.0] if slow in (None, valve) else [1.0 / lag, 1.0]
+            numerator = np.convolve(plant.numerator, above)
+            b[valve] = Held(np.append(plant.poles, -1.0 / lag), numerator, plant.fraction).sampled()
+        return self._with(np.real(np.poly(poles))[1:], b, self.own.delay) if b else None
 
     def _factors(self, values: FloatArray, what: str, valve: str | None, count: int) -> FloatArray:
         factors = np.ones(count)
@@ -237,3 +253,32 @@ def _of_roots(roots: ComplexArray, what: str, valve: str | None) -> list[Figure]
             pair = (k, *pair)
         found.append(Figure(what, min(GONE * pace, 1.0) - 1.0, MOST[what], pair, valve, 1.0 / pace))
     return found
+
+
+def with_equation(process: Process, output: int, own: ArxOutput, sample_time: float) -> Process:
+    """Return an ARX process with another equation of one output, behind its effects if any."""
+    if isinstance(process, AlteredProcess):
+        inner = with_equation(process.inner, output, own, sample_time)
+        return AlteredProcess(inner, process.effects, sample_time)
+    assert isinstance(process, ArxProcess)
+    equations = (*process.equations[:output], own, *process.equations[output + 1 :])
+    return ArxProcess(equations, process.valves, process.model.stem0, process.model.pv0)
+
+
+def lagged_process(
+    process: Process, output: int, lag: float, sample_time: float, valve: str | None = None
+) -> Process | None:
+    """Return a process with one more lag, that goes on between samples; None without a plant.
+
+    Args:
+        process: as it is.
+        output: index of the output that is slower.
+        lag: time constant, s.
+        sample_time: s.
+        valve: the valve that is slow; None for the process and the sensor.
+    """
+    inner = process.inner if isinstance(process, AlteredProcess) else process
+    if not isinstance(inner, ArxProcess):
+        return None
+    own = Changeable(inner.equations[output]).lagged(lag / sample_time, valve)
+    return None if own is None else with_equation(process, output, own, sample_time)

@@ -3,20 +3,25 @@
 import copy
 import dataclasses
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, Blocks
+from stiction_ros.discrepancy.simulation.between import left_open
 from stiction_ros.discrepancy.simulation.responses import Responses, responses_of
 from stiction_ros.effects import Behaviour, FloatArray, Seen
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.effects.disturbance.periodic import PeriodicDisturbance
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.processes import AlteredProcess, Process
+from stiction_ros.processes import Process
 from stiction_ros.records import Record
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 HELD_SHARE = 4
 BLOCKS = 24
@@ -24,8 +29,6 @@ PHASES = (0, 1, 3)
 """Of the held-out blocks, record by record. By each of them the first block of a record is fitted:
 nothing else holds its state at the start."""
 FEWEST = 40  # samples of the longest record
-MOVE_ON = ("stiction", "backlash", "slew", "lag", "pole")
-"""Effects with which what enters a process goes on moving between two samples."""
 SMALL = 0.01  # %, of a move by which a process that is not linear is asked for its slope
 
 
@@ -185,6 +188,8 @@ class FreeRun:
         forced: outputs of the process, shape (N, p), but for the free columns.
         known: what disturbances and sensors of the current model add, shape (N, p).
         free: per output the free columns, shape (N, q).
+        beyond: per output and valve what a lag does beyond the samples, by the logarithm of its
+            time constant; laid when it is first asked.
     """
 
     def __init__(
@@ -201,7 +206,7 @@ class FreeRun:
             InputError: the model's free run is not finite.
         """
         self.model, self.runs = model, runs
-        self.leads = dict(leads or {})
+        self.leads, self.beyond = dict(leads or {}), dict[tuple[int, int | None], "CubicSpline"]()
         self.responses: Responses = responses_of(model.process, model.sample_time)
         self.scanned = np.column_stack(
             [self.valve_chain(j, valve.effects) for j, valve in enumerate(model.valves)]
@@ -252,7 +257,7 @@ class FreeRun:
         """
         parts = []
         for rows in self.runs.slices:
-            inputs = self._inputs(rows)
+            inputs = self.inputs(rows)
             if valve is not None and stems is not None:
                 inputs[valve] = stems[rows] + self.loads[rows, valve, None]
             parts.append(self.responses.forced(output, inputs))
@@ -271,25 +276,13 @@ class FreeRun:
         return np.asarray(np.clip(stem, low, high))
 
     def _free(self, output: int) -> FloatArray:
-        blocks = [self.responses.free(output, self._inputs(rows)) for rows in self.runs.slices]
-        late = [
-            self._late(output, j)
-            for j, asked in enumerate(self.runs.between)
-            if asked and self.responses.reaches(output, j) and moves_on(self.model, output, j)
-        ]
+        blocks = [self.responses.free(output, self.inputs(rows)) for rows in self.runs.slices]
         within = [
             self._within(output, j)
             for j in range(len(self.model.valves))
             if self.runs.scans is not None and self.responses.reaches(output, j)
         ]
-        return np.column_stack([block_diag(*blocks), *late, *within])
-
-    def _late(self, output: int, valve: int) -> FloatArray:
-        """Return what an output lacks where a stem's moves come a sample late, shape (N, 1)."""
-        moves = np.zeros((len(self.runs), 1))
-        for rows in self.runs.slices:
-            moves[rows][1:, 0] = np.diff(self.stems[rows, valve])
-        return self.slope(output, valve, moves)
+        return np.column_stack([block_diag(*blocks), *left_open(self, output), *within])
 
     def _within(self, output: int, valve: int) -> FloatArray:
         """Return the answers to what the first scan of a sample is above the second, shape (N, 2).
@@ -308,7 +301,7 @@ class FreeRun:
         moved = self.drive(output, valve, self.stems[:, valve, None] + SMALL * moves)
         return np.asarray((moved - self.forced[:, output, None]) / SMALL)
 
-    def _inputs(self, rows: slice) -> list[FloatArray]:
+    def inputs(self, rows: slice) -> list[FloatArray]:
         """Return what enters the process in one record, per valve, each of shape (N, 1)."""
         entering = self.stems[rows] + self.loads[rows]
         return [entering[:, j : j + 1] for j in range(entering.shape[1])]
@@ -359,14 +352,6 @@ def over_samples(values: FloatArray, runs: Runs) -> FloatArray:
     if runs.scans is None:
         return values
     return np.asarray(values.reshape(len(runs), runs.scanned, -1).mean(axis=1))
-
-
-def moves_on(model: LoopModel, output: int, valve: int) -> bool:
-    """Tell whether what a valve does to an output goes on between two samples."""
-    process = model.process
-    slowed = process.effects[output] if isinstance(process, AlteredProcess) else ()
-    on_the_way = (*model.valves[valve].effects, *slowed, *model.sensors[output])
-    return any(effect.effect in MOVE_ON for effect in on_the_way)
 
 
 def _entering(load: Behaviour, count: int, sample_time: float) -> FloatArray:

@@ -15,7 +15,8 @@ from stiction_ros.discrepancy.gap_options import GapOptions
 from stiction_ros.discrepancy.likelihood.noise import SURPRISE
 from stiction_ros.discrepancy.measures import NEARLY_ALL
 from stiction_ros.discrepancy.process.first_model import liveliest_parts
-from stiction_ros.discrepancy.simulation.free_run import PHASES, FreeRun, Runs, moves_on
+from stiction_ros.discrepancy.simulation.between import moves_on
+from stiction_ros.discrepancy.simulation.free_run import PHASES, FreeRun, Runs
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel

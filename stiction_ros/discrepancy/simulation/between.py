@@ -1,0 +1,107 @@
+"""What goes on between two samples while a stem slips or slews, or something lags."""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from stiction_ros.deferred import lfilter
+from stiction_ros.discrepancy.process.slower import lagged_process
+from stiction_ros.discrepancy.simulation.responses import responses_of
+from stiction_ros.effects import Behaviour, FloatArray, Lag
+from stiction_ros.loop import LoopModel
+from stiction_ros.processes import AlteredProcess
+
+if TYPE_CHECKING:
+    from stiction_ros.discrepancy.simulation.free_run import FreeRun
+
+SLIDING = ("stiction", "backlash", "slew")
+"""Effects with which a stem that moves goes on moving between two samples."""
+
+
+def moves_on(model: LoopModel, output: int, valve: int) -> bool:
+    """Tell whether what a valve does to an output goes on between two samples."""
+    on_stem = model.valves[valve].effects
+    lags = _lags((*on_stem, *_in_process(model, output), *model.sensors[output]))
+    return bool(lags) or any(effect.effect in SLIDING for effect in on_stem)
+
+
+def left_open(run: "FreeRun", output: int) -> list[FloatArray]:
+    """Return columns, shape (N, 1), for what an output does between samples.
+
+    How late within a sample a stem moves is not known, nor how far a lag goes on.
+    """
+    model, found = run.model, []
+    asked = [j for j, each in enumerate(run.runs.between) if each]
+    for valve in asked:
+        if not run.responses.reaches(output, valve):
+            continue
+        on_stem = model.valves[valve].effects
+        if any(effect.effect in SLIDING for effect in on_stem):
+            found.append(_a_sample_late(run, output, valve))
+        found += [_ahead(run, lag, _of(run, output, lag, valve)) for lag in _lags(on_stem)]
+    if asked:
+        in_process, at_sensor = _lags(_in_process(model, output)), _lags(model.sensors[output])
+        found += [_ahead(run, lag, _of(run, output, lag)) for lag in in_process]
+        found += [_of(run, output, lag) for lag in at_sensor]
+    return found
+
+
+def beyond_samples(
+    run: "FreeRun", output: int, lags: FloatArray, valve: int | None = None
+) -> FloatArray:
+    """Return what lags of a plant are beyond such that act on the samples alone, shape (N, G).
+
+    A plant is slowed between samples as well. Where the equation is that of none, its output is
+    taken half a sample late.
+
+    Args:
+        run: without the lag.
+        output: index of the output that is slower.
+        lags: time constants, s, shape (G,).
+        valve: index of the slow valve; None for the process and the sensor, which slow all.
+    """
+    step, name = run.runs.sample_time, None if valve is None else run.model.valve_names[valve]
+    found = [lagged_process(run.model.process, output, tau, step, name) for tau in lags.tolist()]
+    plants = [responses_of(each, step) for each in found if each is not None]
+    parts = []
+    for rows in run.runs.slices:
+        inputs, values = run.inputs(rows), run.forced[rows, output]
+        if valve is not None:
+            inputs = [stem if j == valve else np.zeros_like(stem) for j, stem in enumerate(inputs)]
+            values = run.responses.forced(output, inputs)[:, 0]
+        on_samples = Lag.simulate_grid(lags[:, None], values, float(values[0]), step)
+        if plants:
+            exact = np.hstack([plant.forced(output, inputs) for plant in plants])
+            parts.append(exact - on_samples)
+        else:
+            parts.append(-0.5 * np.diff(on_samples, axis=0, prepend=on_samples[:1]))
+    return parts[0] if len(parts) == 1 else np.vstack(parts)
+
+
+def _of(run: "FreeRun", output: int, lag: Lag, valve: int | None = None) -> FloatArray:
+    return beyond_samples(run, output, np.array([lag.time_constant]), valve)
+
+
+def _ahead(run: "FreeRun", lag: Lag, values: FloatArray) -> FloatArray:
+    """Return values of which a lag on the samples makes those given: they have passed it once."""
+    keep = math.exp(-run.runs.sample_time / lag.time_constant)
+    return np.asarray(lfilter([1.0, -keep], [1.0 - keep], values, axis=0))
+
+
+def _a_sample_late(run: "FreeRun", output: int, valve: int) -> FloatArray:
+    """Return what an output lacks where a stem's moves come a sample late, shape (N, 1)."""
+    moves = np.zeros((len(run.runs), 1))
+    for rows in run.runs.slices:
+        moves[rows][1:, 0] = np.diff(run.stems[rows, valve])
+    return run.slope(output, valve, moves)
+
+
+def _in_process(model: LoopModel, output: int) -> tuple[Behaviour, ...]:
+    process = model.process
+    return process.effects[output] if isinstance(process, AlteredProcess) else ()
+
+
+def _lags(effects: Sequence[Behaviour]) -> list[Lag]:
+    return [effect for effect in effects if isinstance(effect, Lag) and effect.time_constant > 0.0]
