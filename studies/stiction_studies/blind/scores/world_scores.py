@@ -104,8 +104,8 @@ def score(
     in_doubt = there | ({(PROCESS, "gain")} if gain_is_off else set())  # a set says no direction
     held = sum(bool(c.names & in_doubt) for c in sets)
     found = [
-        any(_is_right(c, own, alike | may) for c in claims)
-        for own, alike in zip(names, families, strict=True)
+        any(_is_right(c, own, alike | may) for c in claims) or _changed(loop, effect, answer)
+        for own, alike, effect in zip(names, families, loop.hidden, strict=True)
     ]
     unknown = answer["verdict"] == "unknown"
     closed = float(answer["gap"]["closed"]) if claims else math.nan
@@ -152,6 +152,23 @@ def _changes(loop: HiddenLoop, answer: Mapping[str, Any]) -> frozenset[Name]:
             if larger is (abs(true.gain) > abs(known.gain)):
                 found.add((PROCESS, "gain"))
     return frozenset(found)
+
+
+def _changed(loop: HiddenLoop, effect: Effect, answer: Mapping[str, Any]) -> bool:
+    """Whether another gain or dead time of the process is told as such, within a factor of two.
+
+    Where the model is off as well, the figure that is told is that of both together.
+    """
+    plant, known = loop.base.plant, loop.known
+    told = {change["what"]: float(change["value"]) for change in answer["process_changes"]}
+    ratio = 0.0
+    if effect.key == (PROCESS, "delay"):
+        late = effect.figures["extra"] * loop.record.sample_time + plant.dead_time - known.dead_time
+        ratio = told.get("delay", 0.0) / late
+    elif effect.key == (PROCESS, "gain"):
+        other = math.log(effect.figures["factor"] * plant.gain / known.gain)
+        ratio = math.log(told.get("gain", 1.0)) / other
+    return 0.5 < ratio < 2.0
 
 
 def _is_right(claim: Claim, own: frozenset[Name], alike: frozenset[Name]) -> bool:
