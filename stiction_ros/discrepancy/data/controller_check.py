@@ -84,8 +84,7 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
         moves = np.concatenate([np.diff(op[rows]) for rows in runs.slices])
         often = float(np.mean(moves != 0.0))
         quantum = quantum_of(op) if often > MANY else _chosen(op)
-        keep = 1.0 - often if often <= MANY else 0.0
-        beside = [Unseen(quantum**2 / 12.0, keep)] if quantum > 0.0 else []
+        beside = [_of_rounding(runs, op, quantum)] if quantum > 0.0 else []
         beside += [] if check.unsure is None else [check.unsure]
         if asked and often > NEARLY_ALL:  # where OP rests more often, no scan lies between samples
             bends = np.concatenate([0.5 * np.diff(op[rows], 2) for rows in runs.slices])
@@ -93,6 +92,22 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
             beside.append(Unseen((0.5 * spread) ** 2))  # it is held for half a sample
         found.append(tuple(beside))
     return tuple(found)
+
+
+def _of_rounding(runs: Runs, op: FloatArray, quantum: float) -> Unseen:
+    """Return what rounding hides of an OP, remembered as long as its values rest.
+
+    Between the middles of two rests it moves in a line, half a step off its values at most.
+    """
+    product = square = 0.0
+    for values in (op[rows] for rows in runs.slices):
+        ends = np.flatnonzero(np.diff(values, append=np.inf)) + 1
+        middles = 0.5 * (np.append(0, ends[:-1]) + ends - 1)
+        hidden = np.interp(np.arange(len(values)), middles, values[ends - 1]) - values
+        hidden = np.clip(hidden, -0.5 * quantum, 0.5 * quantum)
+        product += float(hidden[1:] @ hidden[:-1])
+        square += float(hidden @ hidden)
+    return Unseen(quantum**2 / 12.0, max(product, 0.0) / square if square > 0.0 else 0.0)
 
 
 def _chosen(values: FloatArray) -> float:
