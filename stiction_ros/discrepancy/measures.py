@@ -1,10 +1,18 @@
 """Limits that several steps share: of evidence, of shares, of rounding."""
 
+import math
+from statistics import NormalDist
+
 MARGIN = 10.0  # BIC by which an effect must beat no effect and its best rival
 SURE = 2.0 * MARGIN  # BIC above the margin: there is a gap, even where no effect can be named
 MAJORITY = 0.5  # of a thing: more is most of it
 NEARLY_ALL = 0.9  # of a thing
-NORMAL = 1.96  # standard errors on either side that hold 95 %
+CONFIDENCE = 0.95  # that an interval holds the truth
+NORMAL = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE)  # standard errors on either side that hold it
+NORMAL_OF_MEDIAN = 1.0 / NormalDist().inv_cdf(0.75)  # σ of normal values, by the median size
+SMOOTH = NORMAL**2  # −2 log likelihood above the least: χ² of one degree of freedom
+STEPPED = -2.0 * math.log1p(-math.sqrt(CONFIDENCE))
+"""The same of the place of a step, (1 − exp(−x / 2))²: Hansen, Econometrica 68 (2000)."""
 ROUNDING = 1e-9  # of a size: less is none
 GAUSS_NEWTON = 20  # steps of a search that has not settled before
 OUTLYING = 8.0  # times the usual size: what is larger is another thing, as a move of SP or a spike

@@ -9,9 +9,9 @@ import numpy as np
 from stiction_ros.discrepancy.data.filled import FLOAT
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
 from stiction_ros.discrepancy.data.scans import Scans, errors_of, law_terms, scanned_twice
-from stiction_ros.discrepancy.data.set_point import NORMAL_OF_MEDIAN, told_set_points
+from stiction_ros.discrepancy.data.set_point import told_set_points
 from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
-from stiction_ros.discrepancy.measures import NEARLY_ALL
+from stiction_ros.discrepancy.measures import NEARLY_ALL, NORMAL_OF_MEDIAN
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning

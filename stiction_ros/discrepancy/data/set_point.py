@@ -12,14 +12,19 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from stiction_ros.discrepancy.data.scans import between_samples
-from stiction_ros.discrepancy.measures import MAJORITY, NEARLY_ALL, OUTLYING, ROUNDING
+from stiction_ros.discrepancy.measures import (
+    MAJORITY,
+    NEARLY_ALL,
+    NORMAL_OF_MEDIAN,
+    OUTLYING,
+    ROUNDING,
+)
 from stiction_ros.discrepancy.simulation.free_run import FEWEST, Runs
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel, PiTuning
 from stiction_ros.signals.holds import stretches
 
 TURNS = 30  # of the weights that make the sum of sizes least
-NORMAL_OF_MEDIAN = 1.4826  # σ of normal values, by the median of their sizes
 
 
 @dataclasses.dataclass(frozen=True)

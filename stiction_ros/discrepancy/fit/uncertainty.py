@@ -12,11 +12,10 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import PROBE, misfit, settled
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.likelihood.noise import given_noise, information, shared_factors
+from stiction_ros.discrepancy.measures import CONFIDENCE, SMOOTH, STEPPED
 from stiction_ros.effects import FloatArray
 from stiction_ros.signals.autoregression import TINY, coloured
 
-SMOOTH = 3.84  # 95 % of one degree of freedom
-STEPPED = 7.35  # 95 % of the place of a step, (1 - exp(-x / 2))²: Hansen, Econometrica 68 (2000)
 FIRST_BOX = 0.05  # of a step of the first grid
 BOXES = 10
 SCATTERED = 300
@@ -176,8 +175,9 @@ def bootstrap_intervals(
     values = _figures(fit.candidate, found)
     sure = likelihood_intervals(base, fit, beside)
     ends: Intervals = {}
+    tails = 0.5 * (1.0 + np.array([-CONFIDENCE, CONFIDENCE]))
     for key in values[0]:
-        low, high = np.quantile([v[key] for v in values], [0.025, 0.975])
+        low, high = np.quantile([v[key] for v in values], tails)
         other = sure.get(key, (float(low), float(high)))
         ends[key] = (min(float(low), other[0]), max(float(high), other[1]))
     return ends

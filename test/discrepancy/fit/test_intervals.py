@@ -11,12 +11,11 @@ from stiction_ros.discrepancy.candidate.wave import DISTURBANCE, SineCandidate, 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.fit.uncertainty import (
-    SMOOTH,
-    STEPPED,
     Region,
     bootstrap_intervals,
     likelihood_intervals,
 )
+from stiction_ros.discrepancy.measures import SMOOTH, STEPPED
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
 from stiction_ros.effects import FloatArray
 
