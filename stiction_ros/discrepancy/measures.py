@@ -15,6 +15,7 @@ STEPPED = -2.0 * math.log1p(-math.sqrt(CONFIDENCE))
 """The same of the place of a step, (1 − exp(−x / 2))²: Hansen, Econometrica 68 (2000)."""
 ROUNDING = 1e-9  # of a size: less is none
 GAUSS_NEWTON = 20  # steps of a search that has not settled before
-OUTLYING = 8.0  # times the usual size: what is larger is another thing, as a move of SP or a spike
+SURPRISE = 5.0  # standard deviations that are never chance: a row counts no more, SP moves
+OUTLYING = SURPRISE * NORMAL_OF_MEDIAN  # times the median size: a move of SP or a spike
 TRIED = 3  # of the best, that are tried as wholes
 TURNS = 2  # in which effects, and a process that is fitted with them, are fitted again

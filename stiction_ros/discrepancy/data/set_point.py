@@ -16,8 +16,8 @@ from stiction_ros.discrepancy.measures import (
     MAJORITY,
     NEARLY_ALL,
     NORMAL_OF_MEDIAN,
-    OUTLYING,
     ROUNDING,
+    SURPRISE,
 )
 from stiction_ros.discrepancy.simulation.free_run import FEWEST, Runs
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
@@ -94,7 +94,7 @@ class _Part:
     def set_point(self, gain: float, integral: float, usual: float) -> FloatArray | None:
         """Return SP, shape (N,); None where it moves too often."""
         told = self.moves + self.columns @ np.array([gain, integral])
-        moved = self.free & (np.abs(np.diff(told, prepend=told[0])) > OUTLYING * usual)
+        moved = self.free & (np.abs(np.diff(told, prepend=told[0])) > SURPRISE * usual)
         begins, _ = stretches(moved)
         rests = self.free & ~moved
         if len(begins) > (1.0 - NEARLY_ALL) * len(told) or not rests.any():

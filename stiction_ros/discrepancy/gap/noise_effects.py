@@ -13,8 +13,7 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_laws import FLOOR, Block, Law, declared_block, laws_of
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise, steady_gain
 from stiction_ros.discrepancy.likelihood.least_squares import left_by_columns
-from stiction_ros.discrepancy.likelihood.noise import SURPRISE
-from stiction_ros.discrepancy.measures import MARGIN, NORMAL, SMOOTH, SURE
+from stiction_ros.discrepancy.measures import MARGIN, NORMAL, SMOOTH, SURE, SURPRISE
 from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
 from stiction_ros.signals.autoregression import TINY
 

@@ -15,7 +15,7 @@ from stiction_ros.discrepancy.likelihood.least_squares import (
     whitened_columns,
 )
 from stiction_ros.discrepancy.likelihood.slow_noise import FIGURES, slow_beside_white
-from stiction_ros.discrepancy.measures import MARGIN, ROUNDING
+from stiction_ros.discrepancy.measures import MARGIN, ROUNDING, SURPRISE
 from stiction_ros.effects import FloatArray
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.signals.autoregression import (
@@ -28,7 +28,6 @@ from stiction_ros.signals.autoregression import (
 
 MAX_ORDER = 6
 NOISE_FIT_ROUNDS = 4
-SURPRISE = 5.0  # standard deviations that one held-out row may count
 SETTLED = 1e-3  # BIC
 
 

@@ -12,8 +12,7 @@ from stiction_ros.discrepancy.decision.explanation import Explanation
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap_options import GapOptions
-from stiction_ros.discrepancy.likelihood.noise import SURPRISE
-from stiction_ros.discrepancy.measures import NEARLY_ALL
+from stiction_ros.discrepancy.measures import NEARLY_ALL, SURPRISE
 from stiction_ros.discrepancy.process.first_model import liveliest_parts
 from stiction_ros.discrepancy.simulation.between import moves_on
 from stiction_ros.discrepancy.simulation.free_run import PHASES, FreeRun, Runs
