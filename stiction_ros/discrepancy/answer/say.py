@@ -13,11 +13,9 @@ from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.decision.scores import Testable
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.discrepancy.measures import MAJORITY
+from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray, about
-
-ACCURATE = 0.01  # of the span of OP: a stem that near follows it
 
 
 def overall(
@@ -144,7 +142,7 @@ def _stem_said(run: FreeRun, valve: int, stem: FloatArray, fits: Sequence[Candid
     said = f"it stands {off:.2g} % off {other}"
     if abs(constant) > off:
         said += f" about a constant {constant:.3g} %"
-    if off <= ACCURATE * float(np.ptp(op)):
+    if off <= NEGLIGIBLE * float(np.ptp(op)):
         return f"{said} and follows it, so that what the simulation misses lies behind the valve"
     lates = range(LONGEST_DELAY + 1)
     late = int(np.argmin([_left(stem[k:], op[: len(op) - k, None])[0] for k in lates]))

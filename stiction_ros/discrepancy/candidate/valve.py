@@ -14,7 +14,7 @@ from stiction_ros.discrepancy.candidate.base import (
     between_axes,
     lag_axis,
 )
-from stiction_ros.discrepancy.measures import ROUNDING
+from stiction_ros.discrepancy.measures import NEGLIGIBLE, ROUNDING
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
 from stiction_ros.effects import (
     Axis,
@@ -34,7 +34,6 @@ from stiction_ros.effects.behaviour import BoolArray
 
 LARGEST = 0.95  # of the span of OP: what never moves the stem cannot be told
 SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best point
-LEAST_BEND = 0.01  # of what a valve travels: straighter is a gain
 STATIONS = 101  # of the travel of a valve, at which its curve has to rise
 LEAST_TRAVEL = 0.05  # of the span of OP
 AT_REST = 1.0 - ROUNDING  # of half a deadband, how far off OP a stem rests at its edge
@@ -222,7 +221,7 @@ class CubicCandidate(ValveCandidate):
         travel = np.linspace(self.low, self.high, STATIONS)
         curve = travel + CubicCharacteristic.shapes(travel) @ point
         chord = np.linspace(curve[0], curve[-1], STATIONS)
-        bent = np.abs(curve - chord).max() >= LEAST_BEND * abs(curve[-1] - curve[0])
+        bent = np.abs(curve - chord).max() >= NEGLIGIBLE * abs(curve[-1] - curve[0])
         return bool(bent and np.all(np.diff(curve) > 0.0))
 
 

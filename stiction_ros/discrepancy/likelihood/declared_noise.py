@@ -10,7 +10,8 @@ import numpy as np
 from scipy.linalg import block_diag, solve_discrete_are, solve_toeplitz
 
 from stiction_ros.deferred import lfilter
-from stiction_ros.discrepancy.likelihood.slow_noise import NEGLIGIBLE, REMEMBERED, counting
+from stiction_ros.discrepancy.likelihood.slow_noise import REMEMBERED, counting
+from stiction_ros.discrepancy.measures import NEGLIGIBLE
 from stiction_ros.effects import ColouredDisturbance, FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, NoiseEntry, Process

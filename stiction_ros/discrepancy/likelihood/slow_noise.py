@@ -3,11 +3,10 @@
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.discrepancy.measures import GAUSS_NEWTON
+from stiction_ros.discrepancy.measures import GAUSS_NEWTON, NEGLIGIBLE
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 REMEMBERED = 60  # samples that such a noise, or an OP off its record, is remembered
-NEGLIGIBLE = 0.01  # of φ
 MOST = 0.9999  # of either pole: a walk that goes on for ten thousand samples
 BEGUN = ((0.98, 0.5), (0.98, 0.9))  # from which it is looked for: the white part small, and large
 FIGURES = len(BEGUN[0])

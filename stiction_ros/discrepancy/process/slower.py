@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_ros.discrepancy.measures import ROUNDING
+from stiction_ros.discrepancy.measures import NEGLIGIBLE, ROUNDING
 from stiction_ros.effects import FloatArray
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, Process
 from stiction_ros.processes.sampled import pulses
@@ -127,7 +127,6 @@ def _trimmed(numerator: FloatArray) -> FloatArray:
 GAIN, TIME_CONSTANT, LEAD, DELAY = "gain", "time_constant", "lead", "delay"
 MOST = dict.fromkeys((GAIN, TIME_CONSTANT, LEAD), 3.0) | {DELAY: 10.0}
 """Shares and samples that a figure may be larger; beyond that it is another plant."""
-GONE = 0.01  # sample, of a time constant that is none
 PROBES = {GAIN: 0.01, TIME_CONSTANT: 0.01, LEAD: 0.01, DELAY: 0.1}  # of the derivatives
 
 
@@ -251,7 +250,9 @@ def _of_roots(roots: ComplexArray, what: str, valve: str | None) -> list[Figure]
         if swings > ROUNDING:
             pair = tuple(np.flatnonzero(np.abs(roots - root.conjugate()) < ROUNDING).tolist())
             pair = (k, *pair)
-        found.append(Figure(what, min(GONE * pace, 1.0) - 1.0, MOST[what], pair, valve, 1.0 / pace))
+        found.append(
+            Figure(what, min(NEGLIGIBLE * pace, 1.0) - 1.0, MOST[what], pair, valve, 1.0 / pace)
+        )
     return found
 
 

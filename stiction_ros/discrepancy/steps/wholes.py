@@ -9,26 +9,23 @@ from stiction_ros.discrepancy.decision.explanation import AddedEffect, Explanati
 from stiction_ros.discrepancy.decision.scores import Scores
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.measures import TRIED
+from stiction_ros.discrepancy.measures import NEGLIGIBLE, TRIED
 from stiction_ros.discrepancy.process.change import changed_process
 from stiction_ros.discrepancy.steps.state import State, Task
-
-INEXACT = 0.01
-"""Share of what all effects gain that each has to gain beside the margin: no plant obeys a law to
-the letter, and what the law misses weighs the more the more it explains."""
 
 
 def best_whole(now: Explanation, margin: float) -> Explanation:
     """Return the best of all subsets of what was found, one effect after the other.
 
-    Every further effect has to gain the margin, beside a share of what all gain.
+    Every further effect has to gain the margin, beside a share of what all gain: no plant obeys a
+    law to the letter, and what the law misses weighs the more the more it explains.
     """
     added = now.effects
     if not added:
         return now
     tried, price = [now, now.holding(())], margin
     if len(added) > 1:
-        price += INEXACT * max(tried[1].score - tried[0].score, 0.0)
+        price += NEGLIGIBLE * max(tried[1].score - tried[0].score, 0.0)
         for count in range(1, len(added)):
             tried += [now.refitted(part) for part in itertools.combinations(added, count)]
     return min(tried, key=lambda each: each.worth(price))
