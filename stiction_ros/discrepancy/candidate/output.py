@@ -15,6 +15,7 @@ from stiction_ros.discrepancy.candidate.base import (
     between_axes,
     lag_axis,
 )
+from stiction_ros.discrepancy.measures import SLIGHT
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end
 from stiction_ros.effects import (
     Axis,
@@ -31,7 +32,6 @@ from stiction_ros.processes import Process
 LONGEST_DELAY = 20
 LEAST_CHANGE = 0.03  # of the gain
 LEAST_GAIN = 0.25
-INTEGRATES = 0.05  # of the record: a process with a longer time constant may leak
 KNOTS = 6
 LAGS = (0.0, 2.0, 6.0, 18.0)  # samples
 
@@ -139,7 +139,7 @@ def output_candidates(run: FreeRun) -> list[Candidate]:
             ).or_else(f"sensor:{tag}", Lag.effect),
             FilterCandidate.of(run, i, ExtraDelay, (delays,)),
         ]
-        if memory > INTEGRATES * longest:
+        if memory > SLIGHT * longest:
             lowest = max(0.3 / longest, 0.5 / memory) / step
             rates = Axis(lowest, 0.3 / step, 18, logarithmic=True)
             found.append(FilterCandidate.of(run, i, Leak, (rates,)))

@@ -14,7 +14,7 @@ from stiction_ros.discrepancy.candidate.base import (
     between_axes,
     lag_axis,
 )
-from stiction_ros.discrepancy.measures import NEGLIGIBLE, ROUNDING
+from stiction_ros.discrepancy.measures import NEGLIGIBLE, ROUNDING, SLIGHT
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
 from stiction_ros.effects import (
     Axis,
@@ -32,13 +32,10 @@ from stiction_ros.effects import (
 )
 from stiction_ros.effects.behaviour import BoolArray
 
-LARGEST = 0.95  # of the span of OP: what never moves the stem cannot be told
 SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best point
 STATIONS = 101  # of the travel of a valve, at which its curve has to rise
-LEAST_TRAVEL = 0.05  # of the span of OP
 AT_REST = 1.0 - ROUNDING  # of half a deadband, how far off OP a stem rests at its edge
 SHORT_OF_A_SLIP = 0.98  # of f_S; where there is a jump it rests at f_D, well inside
-LEAST_JUMP = 0.05  # of the band: less may be what the stem moves between two samples
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -124,7 +121,8 @@ class StictionCandidate(ValveCandidate):
         return True
 
     def leaps(self, point: FloatArray) -> bool:
-        return float(1.0 - point[1]) >= LEAST_JUMP * float(1.0 + point[1])
+        # A smaller one may be what the stem moves between two samples.
+        return float(1.0 - point[1]) >= SLIGHT * float(1.0 + point[1])
 
     def of_cube(self, cubes: FloatArray) -> FloatArray:
         """Return points for shares, shape (G, axes), of all sums, jumps and starts.
@@ -241,7 +239,7 @@ class SaturationCandidate(ValveCandidate):
     def possible(self, points: FloatArray) -> BoolArray:
         """Refuse ends that leave hardly any travel: whatever holds it, such a valve stands."""
         span = self.axes[1].high - self.axes[0].low
-        return np.asarray(np.abs(points[:, 1] - points[:, 0]) >= LEAST_TRAVEL * span)
+        return np.asarray(np.abs(points[:, 1] - points[:, 0]) >= SLIGHT * span)
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
         return True
@@ -299,8 +297,9 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
         return Axis(least, most, count, logarithmic=True)
 
     # He's slips depend on f_S and f_D to the last digits: its optimum is a needle.
-    fine = sizes(0.01 * span, LARGEST * span, 160), Axis(0.0, 1.0, 17, natural=True), start
-    rough = sizes(0.01 * span, LARGEST * span, 50), Axis(0.0, 1.0, 9, natural=True), start
+    largest = (1.0 - SLIGHT) * span  # what never moves the stem cannot be told
+    fine = sizes(0.01 * span, largest, 160), Axis(0.0, 1.0, 17, natural=True), start
+    rough = sizes(0.01 * span, largest, 50), Axis(0.0, 1.0, 9, natural=True), start
     bands = sizes(0.02 * span, 1.8 * span, 24), start
     rates = sizes(0.003 * fastest, 0.95 * fastest, 24), start
     ends = Axis(low, lower, 14, natural=True), Axis(upper, high, 14, natural=True)

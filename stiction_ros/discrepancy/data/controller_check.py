@@ -11,7 +11,7 @@ from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
 from stiction_ros.discrepancy.data.scans import Scans, errors_of, law_terms, scanned_twice
 from stiction_ros.discrepancy.data.set_point import told_set_points
 from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
-from stiction_ros.discrepancy.measures import NEARLY_ALL, NORMAL_OF_MEDIAN
+from stiction_ros.discrepancy.measures import NEARLY_ALL, NORMAL_OF_MEDIAN, SLIGHT
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
@@ -24,7 +24,6 @@ ROUNDED = 1.2  # times what rounding of the signals leaves
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
 FINE = 0.02  # of the span of OP: values that are chosen are rounder than what rounding shows
 FINEST = 1e-4  # of the span of OP: what is finer says nothing
-MATTERS = 0.05  # of gain and integral time: nearer ones are the same tuning
 
 
 class ControllerStatus(enum.StrEnum):
@@ -219,7 +218,7 @@ def _scans(model: LoopModel, runs: Runs, law: _Law) -> Scans | None:
 def _alike(recorded: PiTuning, law: _Law | Scans) -> bool:
     """Tell whether two tunings differ by less than matters."""
     ratios = law.gain / recorded.gain, law.integral_time / recorded.integral_time
-    return all(1.0 / (1.0 + MATTERS) < ratio < 1.0 + MATTERS for ratio in ratios)
+    return all(1.0 / (1.0 + SLIGHT) < ratio < 1.0 + SLIGHT for ratio in ratios)
 
 
 def _finding(behaviour: Tuning | TimeShift, before: float, law: _Law) -> DataFinding:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from stiction_ros.discrepancy.measures import SLIGHT
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
-OFTEN = 0.05  # of the samples: filled-in values, from which on a record is thinned out
 FLOAT = 2e-7  # of the largest value: digits that a difference of three has by itself
 NEARLY = 5.0  # digits: noise is as often nearly nothing as that is wider than nothing
 
@@ -54,7 +54,7 @@ def _too_often(sizes: FloatArray, digits: float, values: FloatArray) -> BoolArra
     nothing, small = sizes <= digits, sizes <= NEARLY * digits
     none = np.zeros_like(nothing)
     share = float(np.mean(nothing)) if len(sizes) else 0.0
-    if share <= OFTEN or share <= float(np.mean(small)) - share:
+    if share <= SLIGHT or share <= float(np.mean(small)) - share:
         return none
     others = sizes[~nothing & np.isfinite(sizes)]
     if not len(others) or float(np.median(others)) <= NEARLY * digits:

@@ -10,7 +10,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.discrepancy.measures import MAJORITY, MARGIN, SURE
+from stiction_ros.discrepancy.measures import MAJORITY, MARGIN, SLIGHT, SURE
 from stiction_ros.discrepancy.simulation.free_run import HELD_SHARE, FreeRun
 from stiction_ros.effects import Backlash, Stiction, about
 
@@ -20,7 +20,6 @@ OFTEN = 8  # departures from rest that must show no jump before it is said to be
 FRICTION = "friction"  # families of effects
 LAGS = "lag"
 DOUBTFUL = 3.0  # standard deviations
-ONE_LAW = 0.05  # of the evidence of a lag, that another one in its path may explain less
 EQUAL = 1.0  # BIC by which two explanations differ that are one
 
 
@@ -172,7 +171,7 @@ def _apart(fit: CandidateFit, best: CandidateFit, margin: float) -> float:
 
     Two lags of one path are one law: what tells them is where they begin and how they are sampled.
     """
-    return max(margin, ONE_LAW * best.evidence) if _lags(fit) and _lags(best) else margin
+    return max(margin, SLIGHT * best.evidence) if _lags(fit) and _lags(best) else margin
 
 
 def _lags(fit: CandidateFit) -> bool:

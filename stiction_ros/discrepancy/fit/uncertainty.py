@@ -12,11 +12,10 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import PROBE, misfit, settled
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.likelihood.noise import given_noise, information, shared_factors
-from stiction_ros.discrepancy.measures import CONFIDENCE, SMOOTH, STEPPED
+from stiction_ros.discrepancy.measures import CONFIDENCE, SLIGHT, SMOOTH, STEPPED
 from stiction_ros.effects import FloatArray
 from stiction_ros.signals.autoregression import TINY, coloured
 
-FIRST_BOX = 0.05  # of a step of the first grid
 BOXES = 10
 SCATTERED = 300
 FARTHEST = 1.5  # times the difference of two points, by which another one moves
@@ -46,7 +45,7 @@ class Region:
         bound = STEPPED if fit.candidate.stepped else SMOOTH
         centre = fit.candidate.coordinates(fit.point)
         least = np.array([1.0 if axes[d].whole else 0.0 for d in free])
-        width = np.maximum([FIRST_BOX * axes[d].spacing for d in free], least)
+        width = np.maximum([SLIGHT * axes[d].spacing for d in free], least)
         halton, random = halton_sequence(len(free), seed=0), np.random.default_rng(0)
         points, scores = np.zeros((0, len(axes))), np.zeros(0)
         kept = points

@@ -38,13 +38,13 @@ from stiction_ros.discrepancy.gap.measure import (
 )
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
+from stiction_ros.discrepancy.measures import SLIGHT
 from stiction_ros.discrepancy.process.change import open_figures
 from stiction_ros.discrepancy.steps.look import explained
 from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.effects import FloatArray
 
-A_ROW = 0.1  # of −2 log likelihood, that noise gains beside an effect: a twentieth of its σ
 SOME_STEPS = 3.0  # of the rounding, that a noise which has a law has to span
 MATTERS = 0.2  # of the gap, that an effect has to close by itself, and a noise that is left to be
 
@@ -213,7 +213,8 @@ def _louder(task: Task, state: State) -> list[FoundEffect]:
         fit = base.noise[i]
         if declared is None or not fit.enlarged or not _matters(state, i):
             continue
-        laws = noise_effects(base, i, declared, A_ROW if now.effects or now.changes else 0.0)
+        least = 2.0 * SLIGHT if now.effects or now.changes else 0.0  # a row, by a larger σ
+        laws = noise_effects(base, i, declared, least)
         if laws and laws[0].score < fit.bic(0) + fit.held_minus_two_log - _stranger(state, laws[0]):
             own = base.under_declared(i)
             found.append(of_noise(laws, own.bic(0) + own.held_minus_two_log, task.options.margin))
