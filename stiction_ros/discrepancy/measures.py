@@ -7,6 +7,7 @@ MARGIN = 10.0  # BIC by which an effect must beat no effect and its best rival
 SURE = 2.0 * MARGIN  # BIC above the margin: there is a gap, even where no effect can be named
 MAJORITY = 0.5  # of a thing: more is most of it
 NEARLY_ALL = 0.9  # of a thing
+QUARTER = 0.25  # of a thing
 SLIGHT = 0.05  # of a thing: less does not matter
 NEGLIGIBLE = 0.01  # of a thing: less cannot be seen in it
 CONFIDENCE = 0.95  # that an interval holds the truth
@@ -15,6 +16,7 @@ NORMAL_OF_MEDIAN = 1.0 / NormalDist().inv_cdf(0.75)  # σ of normal values, by t
 SMOOTH = NORMAL**2  # −2 log likelihood above the least: χ² of one degree of freedom
 STEPPED = -2.0 * math.log1p(-math.sqrt(CONFIDENCE))
 """The same of the place of a step, (1 − exp(−x / 2))²: Hansen, Econometrica 68 (2000)."""
+LARGER = 1.0 + QUARTER  # times what is usual: more is another thing
 ROUNDING = 1e-9  # of a size: less is none
 GAUSS_NEWTON = 20  # steps of a search that has not settled before
 SURPRISE = 5.0  # standard deviations that are never chance: a row counts no more, SP moves

@@ -15,7 +15,7 @@ from stiction_ros.discrepancy.candidate.base import (
     between_axes,
     lag_axis,
 )
-from stiction_ros.discrepancy.measures import SLIGHT
+from stiction_ros.discrepancy.measures import QUARTER, SLIGHT
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end
 from stiction_ros.effects import (
     Axis,
@@ -31,7 +31,6 @@ from stiction_ros.processes import Process
 
 LONGEST_DELAY = 20
 LEAST_CHANGE = 0.03  # of the gain
-LEAST_GAIN = 0.25
 KNOTS = 6
 LAGS = (0.0, 2.0, 6.0, 18.0)  # samples
 
@@ -104,7 +103,7 @@ class GainCandidate(OutputCandidate):
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
         """Refuse a process that hardly answers at all: that is a valve that does not move."""
-        return abs(float(factors[0])) >= LEAST_CHANGE and 1.0 + float(factors[0]) >= LEAST_GAIN
+        return abs(float(factors[0])) >= LEAST_CHANGE and 1.0 + float(factors[0]) >= QUARTER
 
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         return ProcessGain(float(np.clip(1.0 + factors[0], 0.01, 100.0)))

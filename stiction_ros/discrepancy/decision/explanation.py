@@ -12,12 +12,10 @@ from stiction_ros.discrepancy.decision.scores import all_candidates
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.likelihood.noise import NoiseFit
-from stiction_ros.discrepancy.measures import MARGIN, TURNS
+from stiction_ros.discrepancy.measures import MARGIN, QUARTER, TURNS
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.loop import LoopModel
-
-TANGENT = 0.25  # steps of a search, by which figures are varied to see what they would do
 
 
 @dataclasses.dataclass(frozen=True)
@@ -182,7 +180,7 @@ class Explanation:
                 continue
             run = run_with(self.bare, self.runs, self.others(k))
             own = candidate.coordinates(point)
-            steps = TANGENT * np.diag([axis.spacing for axis in candidate.axes])
+            steps = QUARTER * np.diag([axis.spacing for axis in candidate.axes])
             points = candidate.values(np.vstack([own + steps, own - steps]))
             response = candidate.respond(run, points)
             for i in response.outputs:

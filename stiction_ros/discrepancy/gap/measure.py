@@ -9,9 +9,8 @@ import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise, seen_noise
+from stiction_ros.discrepancy.measures import LARGER
 from stiction_ros.effects import FloatArray
-
-LARGER = 1.25  # times the declared or the usual standard deviation: more is another noise
 
 
 @dataclasses.dataclass(frozen=True)

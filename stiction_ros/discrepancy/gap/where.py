@@ -5,9 +5,8 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.measure import LARGER
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
-from stiction_ros.discrepancy.measures import MAJORITY, MARGIN
+from stiction_ros.discrepancy.measures import LARGER, MAJORITY, MARGIN
 from stiction_ros.discrepancy.simulation.free_run import FEWEST
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.signals.holds import set_point_moves

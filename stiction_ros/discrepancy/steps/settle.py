@@ -13,13 +13,12 @@ from stiction_ros.discrepancy.decision.decide import (
 )
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.discrepancy.measures import MARGIN, SURE, TRIED
+from stiction_ros.discrepancy.measures import MARGIN, QUARTER, SURE, TRIED
 from stiction_ros.discrepancy.steps.look import look_on, scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import best_whole, mended
 from stiction_ros.effects import Backlash, StepDisturbance, about
 
-CANCEL = 0.25  # of the larger one, that two opposite steps may leave
 Keys = tuple[tuple[str, str], ...]  # places and effects
 
 
@@ -52,7 +51,7 @@ def without_slips(effects: Sequence[AddedEffect]) -> tuple[AddedEffect, ...]:
     for one, other in itertools.combinations(steps, 2):
         first, second = float(one.fit.factors[0]), float(other.fit.factors[0])
         larger = max(abs(first), abs(second))
-        slips = larger <= bands[one.place] and abs(first + second) <= CANCEL * larger
+        slips = larger <= bands[one.place] and abs(first + second) <= QUARTER * larger
         if slips and one.place == other.place:
             return without_slips([e for e in effects if e is not one and e is not other])
     return tuple(effects)
