@@ -10,6 +10,7 @@ import numpy as np
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
+from stiction_ros.discrepancy.measures import NEARLY_ALL, SIDES
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import (
     Axis,
@@ -25,10 +26,9 @@ from stiction_ros.effects import (
 from stiction_ros.signals.autoregression import TINY
 
 LOAD, DISTURBANCE = "load", "disturbance"
-FASTEST = 0.45  # cycles per sample
+FASTEST = NEARLY_ALL / 2.0  # cycles per sample; half a cycle is all that samples tell
 SHAPED = FASTEST / 3.0  # of a square or a triangle: its third harmonic has to be seen
 SLOWEST = 2.0  # cycles in the longest record
-BESIDE = (-0.5, -0.25, 0.0, 0.25, 0.5)  # of the width of a spectral line
 PHASES = 8
 A_FREQUENCY = 3
 """Figures that a frequency counts as: what n samples tell of it grows with n³, of others with n
@@ -134,7 +134,7 @@ class LineCandidate(WaveCandidate):
     def near(self, fastest: float) -> FloatArray:
         """Return frequencies on and beside the lines, shape (K,)."""
         width = 1.0 / self.length
-        beside = self.lines[:, None] + np.array(BESIDE) * width
+        beside = self.lines[:, None] + np.array(SIDES) * (0.5 * width)
         return np.unique(np.clip(beside, SLOWEST * width, fastest))
 
     def count(self, point: FloatArray) -> int:

@@ -19,7 +19,7 @@ from stiction_ros.discrepancy.likelihood.noise import (
     noise_forms,
     shared_factors,
 )
-from stiction_ros.discrepancy.measures import SURE
+from stiction_ros.discrepancy.measures import SCATTERED, SIDES, SURE
 from stiction_ros.effects import Behaviour, FloatArray
 
 LEADERS = 4  # points that are looked at further, under each guess of the noise
@@ -27,7 +27,7 @@ MOMENTS = 241
 REACH = 4.0  # points of the first grid, wider than a held-out block
 SLOW = np.array([0.8])
 SHRINK = 0.4
-BRED, GENERATIONS = 300, 40  # points of a needle, and how often they breed
+GENERATIONS = 40  # how often the points of a needle breed
 BOXES = tuple(0.6**k for k in range(10))  # around the best point, of the largest
 THROWN = 1500  # points in a box
 GAP_SEARCH_ROUNDS = 5
@@ -35,7 +35,6 @@ FAIR = 3  # rounds after which a start that is surely behind is given up
 POLISHES = 8
 NEXT_TO_NOTHING = 0.02  # BIC
 NO_MEMORY = np.zeros(0)
-SIDE = (-1.0, -0.5, 0.0, 0.5, 1.0)
 
 Under = Mapping[int, FloatArray]  # φ of an output's noise
 
@@ -196,7 +195,7 @@ class _Search:
         axes = self.candidate.axes
         steps = np.array([axis.spacing for axis in axes])
         whole = np.array([axis.whole for axis in axes])
-        offsets = np.array(list(itertools.product(*[(0.0,) if a.linear else SIDE for a in axes])))
+        offsets = np.array(list(itertools.product(*[(0.0,) if a.linear else SIDES for a in axes])))
         span = np.where(whole, np.maximum(np.rint(size * steps), 1.0), size * steps)
         found = self._try(best[0] + offsets * span, best[1], under)
         return found if under is not None or found[1].delta_bic >= best[1].delta_bic else best
@@ -221,7 +220,7 @@ class _Search:
         white = dict.fromkeys(range(len(self.base.noise)), NO_MEMORY)
         for under in (white, None):  # None: under the noise of the best fit so far
             leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:LEADERS]
-            first = halton.random(BRED)
+            first = halton.random(SCATTERED)
             first[: len(leading)] = [self.needle.cube(fit.point) for fit in leading]
             found = differential_evolution(
                 self._loss,

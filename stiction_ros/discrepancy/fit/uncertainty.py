@@ -12,12 +12,11 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import PROBE, misfit, settled
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.likelihood.noise import given_noise, information, shared_factors
-from stiction_ros.discrepancy.measures import CONFIDENCE, SLIGHT, SMOOTH, STEPPED
+from stiction_ros.discrepancy.measures import CONFIDENCE, SCATTERED, SLIGHT, SMOOTH, STEPPED
 from stiction_ros.effects import FloatArray
 from stiction_ros.signals.autoregression import TINY, coloured
 
 BOXES = 10
-SCATTERED = 300
 FARTHEST = 1.5  # times the difference of two points, by which another one moves
 SHOWN = 20
 
