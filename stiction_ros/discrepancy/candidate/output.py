@@ -30,7 +30,6 @@ from stiction_ros.effects import (
 from stiction_ros.processes import Process
 
 LONGEST_DELAY = 20
-LEAST_CHANGE = 0.03  # of the gain
 KNOTS = 6
 LAGS = (0.0, 2.0, 6.0, 18.0)  # samples
 
@@ -103,7 +102,7 @@ class GainCandidate(OutputCandidate):
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
         """Refuse a process that hardly answers at all: that is a valve that does not move."""
-        return abs(float(factors[0])) >= LEAST_CHANGE and 1.0 + float(factors[0]) >= QUARTER
+        return abs(float(factors[0])) >= SLIGHT and 1.0 + float(factors[0]) >= QUARTER
 
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         return ProcessGain(float(np.clip(1.0 + factors[0], 0.01, 100.0)))

@@ -11,18 +11,16 @@ from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
 from stiction_ros.discrepancy.data.scans import Scans, errors_of, law_terms, scanned_twice
 from stiction_ros.discrepancy.data.set_point import told_set_points
 from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
-from stiction_ros.discrepancy.measures import NEARLY_ALL, NORMAL_OF_MEDIAN, SLIGHT
+from stiction_ros.discrepancy.measures import NEARLY_ALL, NEGLIGIBLE, NORMAL_OF_MEDIAN, SLIGHT
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
 
 LONGEST_SHIFT = 30
-EXACT = 0.02  # of the moves of OP, that a law may leave which gives them
 ONCE = 5e-3  # of the moves of OP, that a law leaves which scans once
 TWICE = 0.1  # of the moves of OP, that one scan leaves of a law which scans twice
 ROUNDED = 1.2  # times what rounding of the signals leaves
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
-FINE = 0.02  # of the span of OP: values that are chosen are rounder than what rounding shows
 FINEST = 1e-4  # of the span of OP: what is finer says nothing
 
 
@@ -76,7 +74,7 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
     """
     untold = any(record.sp is None for record in runs.records)
     given = check.status in (ControllerStatus.NOT_ASKED, ControllerStatus.OTHER) and not untold
-    asked = not given and check.left > EXACT and check.scans is None
+    asked = not given and check.left > NEGLIGIBLE and check.scans is None
     asked = asked or check.between
     found = []
     for op in runs.op.T:
@@ -121,7 +119,7 @@ def _chosen(values: FloatArray) -> float:
         while step > FLOAT * span:
             quantum, step = step, math.fmod(quantum, step)
             step = 0.0 if quantum - step <= FLOAT * span else step
-    return quantum if FINEST * span < quantum <= FINE * span else 0.0
+    return quantum if FINEST * span < quantum <= NEGLIGIBLE * span else 0.0
 
 
 def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
@@ -147,7 +145,7 @@ def _told_by(model: LoopModel, runs: Runs, scans: int) -> ControllerCheck:
     if told is None:
         return NOT_ASKED
     check = _compared(dataclasses.replace(model, controller=told.tuning), told.runs)
-    most = EXACT if check.scans is None else TWICE
+    most = NEGLIGIBLE if check.scans is None else TWICE
     if check.status is not ControllerStatus.SAME or check.left > most:
         return NOT_ASKED
     if check.scans is None:
@@ -173,12 +171,12 @@ def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
     if (
         recorded is not None
         and best == 0
-        and (as_well or (own <= EXACT and _alike(recorded, laws[0])))
+        and (as_well or (own <= NEGLIGIBLE and _alike(recorded, laws[0])))
     ):
-        known = laws[0].left < EXACT
+        known = laws[0].left < NEGLIGIBLE
         return ControllerCheck(ControllerStatus.SAME, None, own, known)
     law = laws[best]
-    if law.left > max(EXACT, ROUNDED * _rounding(runs, law)):
+    if law.left > max(NEGLIGIBLE, ROUNDED * _rounding(runs, law)):
         return ControllerCheck(ControllerStatus.UNEXPLAINED, None, law.left, False)
     if recorded is None and best == 0:
         rounded = quantum_of(runs.op[:, 0]) > 0.0

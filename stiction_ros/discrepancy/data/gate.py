@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.filled import drawn, held
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
-from stiction_ros.discrepancy.measures import MAJORITY, OUTLYING
+from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE, OUTLYING
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
 from stiction_ros.effects.behaviour import BoolArray, IntArray
@@ -22,7 +22,6 @@ SHOWN = (Freeze, Clip, Quantisation)
 """What is looked for here."""
 LONGEST_REST = 12
 ENDS = 6
-ALIKE = 0.02  # share by which two quanta, or two ends over the range of PV, may differ
 LATTICE = 1e-3  # of the range of PV: coarser rounding makes single values stand out
 COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a finding
 
@@ -120,7 +119,7 @@ def known_already(model: LoopModel, runs: Runs, finding: DataFinding) -> bool:
     """Tell whether the model has an effect that shows what a finding says.
 
     That is one of the same kind whose figures are the same as far as the values tell: a quantum
-    to :data:`ALIKE`, a rest within two samples, and the ends that the values meet.
+    to a hundredth, a rest within two samples, and the ends that the values meet.
     """
     output = model.outputs.index(finding.place.partition(":")[2])
     values = runs.pv[runs.slices[finding.record], output]
@@ -133,13 +132,13 @@ def known_already(model: LoopModel, runs: Runs, finding: DataFinding) -> bool:
 
 def _same(known: Behaviour, found: Behaviour, values: FloatArray, sample_time: float) -> bool:
     if isinstance(known, Quantisation) and isinstance(found, Quantisation):
-        return abs(known.quantum - found.quantum) <= ALIKE * found.quantum
+        return abs(known.quantum - found.quantum) <= NEGLIGIBLE * found.quantum
     if isinstance(known, Freeze) and isinstance(found, Freeze):
         begins = abs(known.onset - found.onset) <= 2.0 * sample_time
         ends = known.onset + known.duration - found.onset - found.duration
         return begins and abs(ends) <= 2.0 * sample_time
     if isinstance(known, Clip) and isinstance(found, Clip):
-        width = ALIKE * max(float(np.ptp(values)), 1e-300)
+        width = NEGLIGIBLE * max(float(np.ptp(values)), 1e-300)
         pairs = ((known.low, found.low), (known.high, found.high))
         met = [(mine, seen) for mine, seen in pairs if values.min() <= seen <= values.max()]
         return all(abs(mine - seen) <= width for mine, seen in met)

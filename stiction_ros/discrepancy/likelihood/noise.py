@@ -15,7 +15,7 @@ from stiction_ros.discrepancy.likelihood.least_squares import (
     whitened_columns,
 )
 from stiction_ros.discrepancy.likelihood.slow_noise import FIGURES, slow_beside_white
-from stiction_ros.discrepancy.measures import MARGIN, ROUNDING, SURPRISE
+from stiction_ros.discrepancy.measures import MARGIN, NEGLIGIBLE, ROUNDING, SURPRISE
 from stiction_ros.effects import FloatArray
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.signals.autoregression import (
@@ -241,7 +241,6 @@ def shared_factors(
     return np.asarray(np.linalg.pinv(total) @ wanted)
 
 
-SMALLEST = 0.02  # σ over the quantum
 _ROOT = math.sqrt(2.0)
 _LEAST = 1e-12
 
@@ -265,8 +264,8 @@ def grouped(fit: NoiseFit, quantum: float, blocks: Blocks) -> NoiseFit:
 
     white = fit.innovations
     inside, held = (np.ascontiguousarray(white[rows]) for rows in (blocks.train, blocks.held))
-    low = math.log(SMALLEST * quantum)
-    high = math.log(max(3.0 * float(np.std(inside)), 2.0 * SMALLEST * quantum))
+    low = math.log(NEGLIGIBLE * quantum)
+    high = math.log(max(3.0 * float(np.std(inside)), 2.0 * NEGLIGIBLE * quantum))
     best = minimize_scalar(
         lambda x: _minus_two_log(inside, quantum, math.exp(x), np.inf),
         bounds=(low, high),

@@ -15,7 +15,14 @@ from stiction_ros.discrepancy.decision.explanation import (
 )
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.least_squares import left_by
-from stiction_ros.discrepancy.measures import GAUSS_NEWTON, MARGIN, NEARLY_ALL, NORMAL, ROUNDING
+from stiction_ros.discrepancy.measures import (
+    GAUSS_NEWTON,
+    MARGIN,
+    NEARLY_ALL,
+    NEGLIGIBLE,
+    NORMAL,
+    ROUNDING,
+)
 from stiction_ros.discrepancy.process.slower import GAIN, Changeable, with_equation
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
@@ -25,7 +32,6 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.processes import ArxProcess
 from stiction_ros.signals.autoregression import whiten
 
-TINY_STEP = 0.02  # of the probes, at which it has settled
 SURE = 2.5  # standard errors by which a figure has to be another than the model's
 PROBE, LARGEST_STEP = 0.02, 0.5  # of an effect's figure: probe of its derivative, longest step
 Tried = tuple[float, BoolArray, FloatArray, FloatArray, tuple[AddedEffect, ...]]
@@ -208,8 +214,8 @@ class _Search:
             more = np.clip(step[count:], -LARGEST_STEP, LARGEST_STEP).tolist()
             for k, each in zip(self.smooth, more, strict=True):
                 self.effects = self._with_stepped(k, each)
-            settled = np.all(np.abs(moved) < TINY_STEP * self.probes)
-            if settled and all(abs(each) < TINY_STEP * PROBE for each in more):
+            settled = np.all(np.abs(moved) < NEGLIGIBLE * self.probes)
+            if settled and all(abs(each) < NEGLIGIBLE * PROBE for each in more):
                 break
 
     def slopes(self) -> FloatArray:
