@@ -8,6 +8,7 @@ import numpy as np
 from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.likelihood.least_squares import DEPENDENT, left_by, whitened_block
+from stiction_ros.discrepancy.measures import PROBE
 from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
 from stiction_ros.signals.autoregression import TINY, whiten
 
@@ -100,9 +101,6 @@ def misfit(
     if response.possible is not None:
         total = np.where(response.possible, total, np.inf)
     return np.asarray(total)
-
-
-PROBE = 0.05  # of a linear axis, at which its parabola is taken
 
 
 def settled(

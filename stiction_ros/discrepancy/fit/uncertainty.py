@@ -9,10 +9,10 @@ import numpy as np
 from stiction_ros.deferred import halton_sequence
 from stiction_ros.discrepancy.candidate.base import Candidate, figures_of, spans_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.fit.misfit import PROBE, misfit, settled
+from stiction_ros.discrepancy.fit.misfit import misfit, settled
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.likelihood.noise import given_noise, information, shared_factors
-from stiction_ros.discrepancy.measures import CONFIDENCE, SCATTERED, SLIGHT, SMOOTH, STEPPED
+from stiction_ros.discrepancy.measures import CONFIDENCE, PROBE, SCATTERED, SLIGHT, SMOOTH, STEPPED
 from stiction_ros.effects import FloatArray
 from stiction_ros.signals.autoregression import TINY, coloured
 

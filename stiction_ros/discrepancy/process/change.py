@@ -21,6 +21,7 @@ from stiction_ros.discrepancy.measures import (
     NEARLY_ALL,
     NEGLIGIBLE,
     NORMAL,
+    PROBE,
     ROUNDING,
 )
 from stiction_ros.discrepancy.process.slower import GAIN, Changeable, with_equation
@@ -33,7 +34,7 @@ from stiction_ros.processes import ArxProcess
 from stiction_ros.signals.autoregression import whiten
 
 SURE = 2.5  # standard errors by which a figure has to be another than the model's
-PROBE, LARGEST_STEP = 0.02, 0.5  # of an effect's figure: probe of its derivative, longest step
+LARGEST_STEP = 0.5  # of an effect's figure
 Tried = tuple[float, BoolArray, FloatArray, FloatArray, tuple[AddedEffect, ...]]
 
 
@@ -125,7 +126,6 @@ class _Search:
         self.least = np.array([each.least for each in self.figures])
         self.most = np.array([each.most for each in self.figures])
         self.gains = np.array([each.what == GAIN for each in self.figures])
-        self.probes = np.array([each.probe for each in self.figures])
         self.free = np.ones(len(self.figures), dtype=bool)
         self.values, self.errors = np.zeros(len(self.free)), np.full(len(self.free), np.inf)
 
@@ -214,8 +214,7 @@ class _Search:
             more = np.clip(step[count:], -LARGEST_STEP, LARGEST_STEP).tolist()
             for k, each in zip(self.smooth, more, strict=True):
                 self.effects = self._with_stepped(k, each)
-            settled = np.all(np.abs(moved) < NEGLIGIBLE * self.probes)
-            if settled and all(abs(each) < NEGLIGIBLE * PROBE for each in more):
+            if np.all(np.abs([*moved, *more]) < NEGLIGIBLE * PROBE):
                 break
 
     def slopes(self) -> FloatArray:
@@ -233,11 +232,11 @@ class _Search:
         moved = []
         for k, each in enumerate(np.eye(len(self.free))):
             if self.free[k]:
-                equation = self.equation.changed(self.values + self.probes * each)
+                equation = self.equation.changed(self.values + PROBE * each)
                 other = with_equation(
                     run.model.process, self.output, equation, run.runs.sample_time
                 )
-                moved.append((run.gap_behind(other, self.output) - gap) / self.probes[k])
+                moved.append((run.gap_behind(other, self.output) - gap) / PROBE)
         return np.column_stack(moved)
 
     def _slopes(self, run: FreeRun, gap: FloatArray) -> FloatArray:

@@ -127,7 +127,6 @@ def _trimmed(numerator: FloatArray) -> FloatArray:
 GAIN, TIME_CONSTANT, LEAD, DELAY = "gain", "time_constant", "lead", "delay"
 MOST = dict.fromkeys((GAIN, TIME_CONSTANT, LEAD), 3.0) | {DELAY: 10.0}
 """Shares and samples that a figure may be larger; beyond that it is another plant."""
-PROBES = {GAIN: 0.01, TIME_CONSTANT: 0.01, LEAD: 0.01, DELAY: 0.1}  # of the derivatives
 
 
 @dataclasses.dataclass(frozen=True)
@@ -142,11 +141,6 @@ class Figure:
     roots: tuple[int, ...] = ()  # which poles or zeros it moves; a pair moves together
     valve: str | None = None  # whose zeros; None for poles
     lasts: float | None = None  # time constant, samples; None for gain and delay
-
-    @property
-    def probe(self) -> float:
-        """Change by which a derivative is taken."""
-        return PROBES[self.what]
 
 
 class Changeable:

@@ -10,6 +10,7 @@ from scipy.linalg import block_diag
 
 from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, Blocks
+from stiction_ros.discrepancy.measures import PROBE
 from stiction_ros.discrepancy.simulation.between import left_open
 from stiction_ros.discrepancy.simulation.responses import Responses, responses_of
 from stiction_ros.effects import Behaviour, FloatArray, Seen
@@ -29,7 +30,6 @@ PHASES = (0, 1, 3)
 """Of the held-out blocks, record by record. By each of them the first block of a record is fitted:
 nothing else holds its state at the start."""
 FEWEST = 40  # samples of the longest record
-SMALL = 0.01  # %, of a move by which a process that is not linear is asked for its slope
 
 
 @dataclasses.dataclass(frozen=True)
@@ -298,8 +298,8 @@ class FreeRun:
 
     def slope(self, output: int, valve: int, moves: FloatArray) -> FloatArray:
         """Return what small moves of a stem, shape (N, G), %, do to an output, per %."""
-        moved = self.drive(output, valve, self.stems[:, valve, None] + SMALL * moves)
-        return np.asarray((moved - self.forced[:, output, None]) / SMALL)
+        moved = self.drive(output, valve, self.stems[:, valve, None] + PROBE * moves)
+        return np.asarray((moved - self.forced[:, output, None]) / PROBE)
 
     def inputs(self, rows: slice) -> list[FloatArray]:
         """Return what enters the process in one record, per valve, each of shape (N, 1)."""
