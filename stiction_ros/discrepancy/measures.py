@@ -16,6 +16,7 @@ NORMAL_OF_MEDIAN = 1.0 / NormalDist().inv_cdf(0.75)  # σ of normal values, by t
 SMOOTH = NORMAL**2  # −2 log likelihood above the least: χ² of one degree of freedom
 STEPPED = -2.0 * math.log1p(-math.sqrt(CONFIDENCE))
 """The same of the place of a step, (1 − exp(−x / 2))²: Hansen, Econometrica 68 (2000)."""
+TRACE = 1e-3  # of a thing: less leaves no trace in what is measured
 LARGER = 1.0 + QUARTER  # times what is usual: more is another thing
 ROUNDING = 1e-9  # of a size: less is none
 GAUSS_NEWTON = 20  # steps of a search that has not settled before

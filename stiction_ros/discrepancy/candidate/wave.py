@@ -10,7 +10,7 @@ import numpy as np
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
-from stiction_ros.discrepancy.measures import NEARLY_ALL, SIDES
+from stiction_ros.discrepancy.measures import NEARLY_ALL, SIDES, TRACE
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import (
     Axis,
@@ -37,7 +37,6 @@ Signal Processing 44, 1996)."""
 PEAKS, STANDING_OUT = 6, 3
 NEIGHBOURS = 51  # frequencies, half a spectral line apart, whose median a line is held against
 SURPRISES = 12
-SAME = 1e-3  # of a wave's length, that another one and the start of the record may leave of it
 _TURN = 2.0 * math.pi
 
 # What no record of OP and PV tells from a shape at a place.
@@ -288,7 +287,7 @@ def _not_told(run: FreeRun, load: WaveCandidate, found: list[Candidate]) -> int 
     wave = same.respond(run, point).sizes[output][:, 0]
     basis = projector(np.hstack([wave, run.free[output]]))
     left = left_by(basis, response.sizes[output][:, 0])
-    told = float(np.sum(left**2)) > SAME**2 * float(np.sum(response.sizes[output] ** 2))
+    told = float(np.sum(left**2)) > TRACE**2 * float(np.sum(response.sizes[output] ** 2))
     return None if told else place
 
 

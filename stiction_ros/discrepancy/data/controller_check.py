@@ -11,7 +11,13 @@ from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
 from stiction_ros.discrepancy.data.scans import Scans, errors_of, law_terms, scanned_twice
 from stiction_ros.discrepancy.data.set_point import told_set_points
 from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
-from stiction_ros.discrepancy.measures import NEARLY_ALL, NEGLIGIBLE, NORMAL_OF_MEDIAN, SLIGHT
+from stiction_ros.discrepancy.measures import (
+    NEARLY_ALL,
+    NEGLIGIBLE,
+    NORMAL_OF_MEDIAN,
+    SLIGHT,
+    TRACE,
+)
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
@@ -21,7 +27,6 @@ ONCE = 5e-3  # of the moves of OP, that a law leaves which scans once
 TWICE = 0.1  # of the moves of OP, that one scan leaves of a law which scans twice
 ROUNDED = 1.2  # times what rounding of the signals leaves
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
-FINEST = 1e-4  # of the span of OP: what is finer says nothing
 
 
 class ControllerStatus(enum.StrEnum):
@@ -119,7 +124,7 @@ def _chosen(values: FloatArray) -> float:
         while step > FLOAT * span:
             quantum, step = step, math.fmod(quantum, step)
             step = 0.0 if quantum - step <= FLOAT * span else step
-    return quantum if FINEST * span < quantum <= NEGLIGIBLE * span else 0.0
+    return quantum if TRACE * span < quantum <= NEGLIGIBLE * span else 0.0
 
 
 def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:

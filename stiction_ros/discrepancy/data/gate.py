@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.filled import drawn, held
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
-from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE, OUTLYING
+from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE, OUTLYING, TRACE
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
 from stiction_ros.effects.behaviour import BoolArray, IntArray
@@ -22,7 +22,6 @@ SHOWN = (Freeze, Clip, Quantisation)
 """What is looked for here."""
 LONGEST_REST = 12
 ENDS = 6
-LATTICE = 1e-3  # of the range of PV: coarser rounding makes single values stand out
 COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a finding
 
 
@@ -286,7 +285,7 @@ def _alone(values: FloatArray) -> BoolArray:
         return found
     beside = 0.5 * (values[:-2] + values[2:])
     away, apart = np.abs(values[1:-1] - beside), np.abs(values[2:] - values[:-2])
-    scale = max(float(np.median(away)), LATTICE * float(np.ptp(values)))
+    scale = max(float(np.median(away)), TRACE * float(np.ptp(values)))
     found[1:-1] = (away > OUTLYING * scale) & (apart < 0.5 * away)
     beside, apart = 0.5 * (values[:-3] + values[3:]), np.abs(values[3:] - values[:-3])
     away = np.minimum(np.abs(values[1:-2] - beside), np.abs(values[2:-1] - beside))

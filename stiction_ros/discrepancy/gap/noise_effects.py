@@ -10,10 +10,10 @@ from scipy.linalg import block_diag
 from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.candidate.base import figures_of, spans_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.noise_laws import FLOOR, Block, Law, declared_block, laws_of
+from stiction_ros.discrepancy.gap.noise_laws import Block, Law, declared_block, laws_of
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise, steady_gain
 from stiction_ros.discrepancy.likelihood.least_squares import left_by_columns
-from stiction_ros.discrepancy.measures import MARGIN, NORMAL, SMOOTH, SURE, SURPRISE
+from stiction_ros.discrepancy.measures import MARGIN, NORMAL, SMOOTH, SURE, SURPRISE, TRACE
 from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
 from stiction_ros.signals.autoregression import TINY
 
@@ -103,7 +103,7 @@ class _Judge:
         own, blocks = self.own, self.blocks
         unit = max(own.r, float(np.trace(own.q)), TINY)
         a, c = block_diag(own.a, block.a), np.concatenate([own.c, block.c])
-        white = max(own.r, FLOOR * unit) / unit
+        white = max(own.r, TRACE * unit) / unit
         steady = steady_gain(a, block_diag(own.q, block.q) / unit, c, white)
         if steady is None:
             return _Score(math.inf, 0.0, 1.0)

@@ -8,12 +8,12 @@ import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise, arx_equations
+from stiction_ros.discrepancy.measures import TRACE
 from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
 from stiction_ros.signals.autoregression import companion
 from stiction_ros.signals.state_space import responses
 
-SMALLEST, LARGEST = 1e-4, 10.0  # of the declared noise and of what is left, that are searched
-FLOOR = 1e-6  # of the declared variance, that every measurement has
+LARGEST = 10.0  # of what is left, that is searched
 
 Path = tuple[FloatArray, FloatArray, FloatArray]  # A, b, c
 
@@ -67,7 +67,7 @@ def laws_of(base: Baseline, output: int, declared: DeclaredNoise) -> list[Law]:
     """
     model, step = base.run.model, base.run.runs.sample_time
     left = float(np.std(base.noise[output].residual[base.blocks[output].train]))
-    sizes = np.array([SMALLEST * declared.std, LARGEST * max(left, declared.std)])
+    sizes = np.array([TRACE * declared.std, LARGEST * max(left, declared.std)])
     times = np.array([0.5 * step, float(base.run.runs.time.max())])
     added, walked = f"disturbance:{model.outputs[output]}", sizes / math.sqrt(step)
     coloured = np.log(np.column_stack([sizes, times]))
@@ -118,4 +118,4 @@ def declared_block(base: Baseline, output: int, declared: DeclaredNoise) -> Bloc
     if not count:
         return Block(q, q, np.zeros(0), variance + rounding)
     q[0, 0] = variance
-    return Block(companion(declared.ar), q, np.eye(count)[0], FLOOR * variance + rounding)
+    return Block(companion(declared.ar), q, np.eye(count)[0], TRACE * variance + rounding)

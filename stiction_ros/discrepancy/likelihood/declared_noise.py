@@ -11,14 +11,13 @@ from scipy.linalg import block_diag, solve_discrete_are, solve_toeplitz
 
 from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.likelihood.slow_noise import REMEMBERED, counting
-from stiction_ros.discrepancy.measures import NEGLIGIBLE
+from stiction_ros.discrepancy.measures import NEGLIGIBLE, TRACE
 from stiction_ros.effects import ColouredDisturbance, FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, NoiseEntry, Process
 from stiction_ros.signals.autoregression import companion
 
 LONGEST = 20  # samples that an autoregression of declared noises reaches back
-UNSEEN = 1e-3  # of the variance of a noise, that rounding may add to it when it is whitened
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,7 +94,7 @@ def rounded(noise: DeclaredNoise, quantum: float) -> DeclaredNoise:
     long before it is coarse.
     """
     count, white = len(noise.ar), quantum**2 / 12.0
-    if not count or white * (1.0 + float(noise.ar @ noise.ar)) < UNSEEN * noise.std**2:
+    if not count or white * (1.0 + float(noise.ar @ noise.ar)) < TRACE * noise.std**2:
         return noise
     driven, look = np.zeros((count, count)), np.eye(count)[0]
     driven[0, 0] = 1.0
@@ -180,7 +179,7 @@ def beside_unseen(
         excited[0, 0] = noise.std**2
     states, moved = block_diag(own, passed), block_diag(excited, driven)
     look = np.concatenate([np.eye(1, len(own))[0], shown])
-    steady = steady_gain(states, moved, look, max(white, UNSEEN * noise.std**2))
+    steady = steady_gain(states, moved, look, max(white, TRACE * noise.std**2))
     if steady is None:
         return None
     gain, missed = steady
