@@ -3,6 +3,8 @@
 import math
 from statistics import NormalDist
 
+import numpy as np
+
 MARGIN = 10.0  # BIC by which an effect must beat no effect and its best rival
 SURE = 2.0 * MARGIN  # BIC above the margin: there is a gap, even where no effect can be named
 MAJORITY = 0.5  # of a thing: more is most of it
@@ -19,6 +21,7 @@ STEPPED = -2.0 * math.log1p(-math.sqrt(CONFIDENCE))
 TRACE = 1e-3  # of a thing: less leaves no trace in what is measured
 LARGER = 1.0 + QUARTER  # times what is usual: more is another thing
 ROUNDING = 1e-9  # of a size: less is none
+EPSILON = float(np.finfo(float).eps)  # of a number: what its digits leave open
 GAUSS_NEWTON = 20  # steps of a search that has not settled before
 SURPRISE = 5.0  # standard deviations that are never chance: a row counts no more, SP moves
 OUTLYING = SURPRISE * NORMAL_OF_MEDIAN  # times the median size: a move of SP or a spike

@@ -5,7 +5,7 @@ import numpy as np
 from stiction_ros.discrepancy.measures import SLIGHT
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
-FLOAT = 2e-7  # of the largest value: digits that a difference of three has by itself
+FLOAT = 2.0 * float(np.finfo(np.float32).eps)  # of the largest value: digits of a difference
 NEARLY = 5.0  # digits: noise is as often nearly nothing as that is wider than nothing
 
 

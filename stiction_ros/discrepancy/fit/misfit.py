@@ -7,15 +7,13 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
-from stiction_ros.discrepancy.likelihood.least_squares import DEPENDENT, left_by, whitened_block
-from stiction_ros.discrepancy.measures import PROBE
+from stiction_ros.discrepancy.likelihood.least_squares import left_by, whitened_block
+from stiction_ros.discrepancy.measures import EPSILON, PROBE, ROUNDING
 from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
 from stiction_ros.signals.autoregression import TINY, whiten
 
 if TYPE_CHECKING:
     from stiction_ros.discrepancy.fit.baseline import Baseline
-
-_ROUNDING = 1e-14
 
 
 @compiled
@@ -70,7 +68,7 @@ def taken_by_sizes(
     inside, cross = white @ basis, white @ target
     whole = white @ white.transpose(0, 2, 1)
     gram = whole - inside @ inside.transpose(0, 2, 1)
-    ridge = DEPENDENT * np.trace(gram, axis1=1, axis2=2) + _ROUNDING * np.trace(
+    ridge = ROUNDING * np.trace(gram, axis1=1, axis2=2) + len(target) * EPSILON * np.trace(
         whole, axis1=1, axis2=2
     )
     gram += (ridge + TINY)[:, None, None] * np.eye(sizes.shape[2])

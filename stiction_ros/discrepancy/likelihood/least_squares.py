@@ -4,12 +4,11 @@ import numpy as np
 from scipy.linalg import qr
 
 from stiction_ros.compiled import compiled
-from stiction_ros.discrepancy.measures import ROUNDING
+from stiction_ros.discrepancy.measures import EPSILON, ROUNDING
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.signals.autoregression import TINY, inner_product, whitened_rows
 
-APART = 1e-3  # of a scaled column, beside others: normal equations keep half of all digits
-DEPENDENT = 1e-10  # of a scaled column, beside others: it adds nothing to them
+APART = EPSILON**0.25  # of a scaled column, beside others: normal equations keep half of all digits
 NOTHING = TINY**0.5  # length of a column that is zero on the fitted rows
 
 
@@ -61,7 +60,7 @@ def coefficients(columns: FloatArray, target: FloatArray) -> FloatArray:
     if apart or not len(columns):
         return np.asarray(beta)
     scale = _lengths(columns.T)
-    return np.asarray(np.linalg.lstsq(columns.T / scale, target, rcond=DEPENDENT)[0] / scale)
+    return np.asarray(np.linalg.lstsq(columns.T / scale, target, rcond=ROUNDING)[0] / scale)
 
 
 @compiled
@@ -104,7 +103,7 @@ def projector(columns: FloatArray) -> FloatArray:
         return np.zeros((len(columns), 0))
     basis, left, _ = qr(columns / _lengths(columns), mode="economic", pivoting=True)
     sizes = np.abs(np.diag(left))
-    return np.ascontiguousarray(basis[:, : int(np.sum(sizes > DEPENDENT * sizes[0]))])
+    return np.ascontiguousarray(basis[:, : int(np.sum(sizes > ROUNDING * sizes[0]))])
 
 
 def left_by(basis: FloatArray, values: FloatArray) -> FloatArray:

@@ -242,7 +242,6 @@ def shared_factors(
 
 
 _ROOT = math.sqrt(2.0)
-_LEAST = 1e-12
 
 
 def grouped(fit: NoiseFit, quantum: float, blocks: Blocks) -> NoiseFit:
@@ -296,10 +295,5 @@ def _minus_two_log(white: FloatArray, quantum: float, spread: float, most: float
         away = min(abs(white[k]), half + most * spread)
         upper = 0.5 * math.erfc((away - half) / spread / _ROOT)
         lower = 0.5 * math.erfc((away + half) / spread / _ROOT)
-        share = upper - lower
-        if share > _LEAST:
-            total -= 2.0 * math.log(share / quantum)
-        else:
-            beyond = (away - half) / spread
-            total += beyond * beyond - 2.0 * math.log(_LEAST / quantum)
+        total -= 2.0 * math.log(max(upper - lower, TINY) / quantum)
     return total

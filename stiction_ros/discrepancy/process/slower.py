@@ -8,13 +8,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_ros.discrepancy.measures import NEGLIGIBLE, ROUNDING
+from stiction_ros.discrepancy.measures import EPSILON, NEGLIGIBLE, ROUNDING
 from stiction_ros.effects import FloatArray
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, Process
 from stiction_ros.processes.sampled import pulses
 
 FRACTIONS = 41  # of a sample, at which the dead time's is looked for
-EXACT = 1e-6  # of b, that the continuous plant may miss, and of a numerator, that is rounding
+EXACT = (
+    EPSILON**0.5
+)  # of b, that the continuous plant may miss, and of a numerator: half the digits
 
 ComplexArray = NDArray[np.complex128]
 
