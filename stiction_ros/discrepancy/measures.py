@@ -27,6 +27,7 @@ SURPRISE = 5.0  # standard deviations that are never chance: a row counts no mor
 OUTLYING = SURPRISE * NORMAL_OF_MEDIAN  # times the median size: a move of SP or a spike
 TRIED = 3  # of the best, that are tried as wholes
 PROBE = 0.01  # of a figure or its axis, by which it is varied for a derivative
+LONGEST_DELAY = 20  # samples by which one signal may follow another
 SCATTERED = 300  # points thrown among all figures of a search
 SIDES = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of what is best, of the steps at which it was found
 TURNS = 2  # in which effects, and a process that is fitted with them, are fitted again

@@ -7,13 +7,12 @@ import numpy as np
 from stiction_ros.discrepancy.answer.found_effects import FoundEffect
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.base import figures_of
-from stiction_ros.discrepancy.candidate.output import LONGEST_DELAY
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.decision.scores import Testable
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE
+from stiction_ros.discrepancy.measures import LONGEST_DELAY, MAJORITY, NEGLIGIBLE
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray, about
 

@@ -15,7 +15,7 @@ from stiction_ros.discrepancy.candidate.base import (
     between_axes,
     lag_axis,
 )
-from stiction_ros.discrepancy.measures import QUARTER, SLIGHT
+from stiction_ros.discrepancy.measures import LONGEST_DELAY, QUARTER, SLIGHT
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end
 from stiction_ros.effects import (
     Axis,
@@ -29,7 +29,6 @@ from stiction_ros.effects import (
 )
 from stiction_ros.processes import Process
 
-LONGEST_DELAY = 20
 KNOTS = 6
 LAGS = (0.0, 2.0, 6.0, 18.0)  # samples
 

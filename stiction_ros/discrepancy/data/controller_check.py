@@ -12,6 +12,7 @@ from stiction_ros.discrepancy.data.scans import Scans, errors_of, law_terms, sca
 from stiction_ros.discrepancy.data.set_point import told_set_points
 from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
 from stiction_ros.discrepancy.measures import (
+    LONGEST_DELAY,
     NEARLY_ALL,
     NEGLIGIBLE,
     NORMAL_OF_MEDIAN,
@@ -22,7 +23,6 @@ from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
 
-LONGEST_SHIFT = 30
 ONCE = 5e-3  # of the moves of OP, that a law leaves which scans once
 TWICE = 0.1  # of the moves of OP, that one scan leaves of a law which scans twice
 ROUNDED = 1.2  # times what rounding of the signals leaves
@@ -165,7 +165,7 @@ def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
     Without a recorded tuning, gain and integral time are fitted: then only the clock can be
     checked. Samples at which OP rests at a limit are left out.
     """
-    laws = [_law(model, runs, shift) for shift in range(LONGEST_SHIFT + 1)]
+    laws = [_law(model, runs, shift) for shift in range(LONGEST_DELAY + 1)]
     scans = _scans(model, runs, laws[0])
     if scans is not None:
         return ControllerCheck(ControllerStatus.SAME, None, laws[0].left, False, scans)

@@ -17,8 +17,6 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, NoiseEntry, Process
 from stiction_ros.signals.autoregression import companion
 
-LONGEST = 20  # samples that an autoregression of declared noises reaches back
-
 
 @dataclasses.dataclass(frozen=True)
 class DeclaredNoise:
@@ -74,8 +72,8 @@ def _beside_white(
     Its φ solve the Yule-Walker equations of their covariance; terms at the end that do not
     count are left out.
     """
-    lags = np.arange(LONGEST + 1) * sample_time
-    covariance = np.zeros(LONGEST + 1)
+    lags = np.arange(REMEMBERED + 1) * sample_time
+    covariance = np.zeros(REMEMBERED + 1)
     covariance[0] = white**2
     for each in coloured:
         covariance += each.std**2 * np.exp(-lags / each.time_constant)
@@ -103,7 +101,7 @@ def rounded(noise: DeclaredNoise, quantum: float) -> DeclaredNoise:
         return noise
     gain, missed = steady
     moving = np.concatenate([[1.0], gain - noise.ar])  # of the innovations, over A
-    inverse = np.asarray(lfilter([1.0], moving, np.eye(1, LONGEST)[0]))
+    inverse = np.asarray(lfilter([1.0], moving, np.eye(1, REMEMBERED)[0]))
     last = int(np.max(np.flatnonzero(np.abs(inverse) > NEGLIGIBLE))) + 1
     whitening = np.convolve(np.concatenate([[1.0], -noise.ar]), inverse[:last])
     return DeclaredNoise(noise.std * float(np.sqrt(missed)), -whitening[1:])

@@ -7,7 +7,6 @@ from stiction_ros.discrepancy.measures import GAUSS_NEWTON, NEGLIGIBLE
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 REMEMBERED = 60  # samples that such a noise, or an OP off its record, is remembered
-MOST = 0.9999  # of either pole: a walk that goes on for ten thousand samples
 BEGUN = ((0.98, 0.5), (0.98, 0.9))  # from which it is looked for: the white part small, and large
 FIGURES = len(BEGUN[0])
 
@@ -42,6 +41,7 @@ def _searched(
 ) -> tuple[float, float, float]:
     """Return the sum of squares and both poles at their best, from a start."""
     best, own, other = np.inf, keep, forget
+    most = 1.0 - 1.0 / len(residual)  # of either pole: a walk that goes on for all samples
     share = 1.0
     step = np.zeros(2)
     for _ in range(GAUSS_NEWTON):
@@ -69,6 +69,6 @@ def _searched(
                 break
         else:
             share *= 0.5
-        keep = min(max(own + share * step[0], -MOST), MOST)
-        forget = min(max(other + share * step[1], -MOST), MOST)
+        keep = min(max(own + share * step[0], -most), most)
+        forget = min(max(other + share * step[1], -most), most)
     return best, own, other
