@@ -23,8 +23,6 @@ from stiction_ros.discrepancy.measures import SCATTERED, SIDES, SURE
 from stiction_ros.effects import Behaviour, FloatArray
 
 LEADERS = 4  # points that are looked at further, under each guess of the noise
-MOMENTS = 241
-REACH = 4.0  # points of the first grid, wider than a held-out block
 SLOW = np.array([0.8])
 SHRINK = 0.4
 GENERATIONS = 40  # how often the points of a needle breed
@@ -98,16 +96,17 @@ def fit_candidate(
 def _dated(search: "_Search") -> CandidateFit:
     """Return the best fit with its moment found on all rows, the held-out ones included.
 
-    A moment within a held-out block leaves no other trace than before and after it.
+    A moment within a held-out block leaves no other trace than before and after it. Asked are the
+    samples of two blocks on either side.
     """
     base, found = search.base, search.best()
     every = tuple(Blocks(b.scored, np.zeros_like(b.held)) for b in base.blocks)
     whole = _Search(dataclasses.replace(base, blocks=every), search.gap, search.candidate)
-    axis = search.candidate.axes[0]
-    centre, reach = axis.inner(float(found.point[0])), REACH * axis.spacing
-    coordinates = np.tile(search.candidate.coordinates(found.point), (MOMENTS, 1))
-    coordinates[:, 0] = np.linspace(centre - reach, centre + reach, MOMENTS)
-    values = search.candidate.values(coordinates)
+    axis, runs = search.candidate.axes[0], base.run.runs
+    near = np.abs(runs.time - found.point[0]) <= 2 * runs.block * runs.sample_time
+    moments = np.unique(np.clip(runs.time[near], axis.low, axis.high))
+    values = np.tile(found.point, (len(moments), 1))
+    values[:, 0] = moments
     response = search.candidate.respond(base.run, values)
     best = whole.best_of(values, response, [found.noise, base.noise])
     other = search.judge(best, search.candidate.respond(base.run, best[None, :]))

@@ -83,7 +83,6 @@ def scored(
 
 
 AROUND = 16  # points of an ellipse
-BLOCK = 25
 
 Intervals = dict[str, tuple[float, float]]
 
@@ -152,7 +151,7 @@ def bootstrap_intervals(
 ) -> Intervals:
     """Return 95 % of each parameter by resampled blocks of innovations.
 
-    Every resample is the fitted response with noise rebuilt from blocks of 25 innovations of
+    Every resample is the fitted response with noise rebuilt from blocks of innovations of
     scored rows in random order, fitted again near the estimate. The interval is at least that of
     the likelihood.
     """
@@ -165,7 +164,9 @@ def bootstrap_intervals(
             noise = fit.noise[i]
             fitted = gap[:, i] - noise.residual
             sound = noise.innovations[base.blocks[i].scored]
-            drawn[:, i] = fitted + _rebuilt(sound, len(drawn), noise.ar, random)
+            drawn[:, i] = fitted + _rebuilt(
+                sound, len(drawn), noise.ar, base.run.runs.block, random
+            )
         again = fit_candidate(base, drawn, fit.candidate, fit.point if len(fit.point) else None)
         found.append((again.point, again.factors))
         if progress is not None:
@@ -248,9 +249,9 @@ def _figures(
 
 
 def _rebuilt(
-    innovations: FloatArray, count: int, ar: FloatArray, random: np.random.Generator
+    innovations: FloatArray, count: int, ar: FloatArray, block: int, random: np.random.Generator
 ) -> FloatArray:
-    """Return ``count`` samples of noise from blocks of innovations in random order."""
-    begins = random.integers(0, max(len(innovations) - BLOCK, 1), count // BLOCK + 1)
-    drawn = np.resize(np.concatenate([innovations[b : b + BLOCK] for b in begins]), count)
+    """Return ``count`` samples of noise from innovations in random order, a ``block`` at a time."""
+    begins = random.integers(0, max(len(innovations) - block, 1), count // block + 1)
+    drawn = np.resize(np.concatenate([innovations[b : b + block] for b in begins]), count)
     return coloured(drawn - drawn.mean(), ar)

@@ -81,9 +81,13 @@ class Runs:
     def kept_back(self, record: int, phase: int) -> BoolArray:
         """Return which rows of one record are kept back, shape (n,)."""
         rows = self.slices[record]
-        size = max(len(self) // BLOCKS, FEWEST // 2)
-        place = np.arange(rows.stop - rows.start) // size + phase
+        place = np.arange(rows.stop - rows.start) // self.block + phase
         return np.asarray(place % HELD_SHARE == HELD_SHARE - 2)
+
+    @property
+    def block(self) -> int:
+        """Samples that are kept back, or drawn again, together."""
+        return max(len(self) // BLOCKS, FEWEST // 2)
 
     def at_scans(self, rows: slice) -> slice:
         """Return where the scans of some rows are."""
