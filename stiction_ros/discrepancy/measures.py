@@ -30,4 +30,5 @@ PROBE = 0.01  # of a figure or its axis, by which it is varied for a derivative
 LONGEST_DELAY = 20  # samples by which one signal may follow another
 SCATTERED = 300  # points thrown among all figures of a search
 SIDES = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of what is best, of the steps at which it was found
+OFTEN = 8  # times: what happens so often is no chance
 TURNS = 2  # in which effects, and a process that is fitted with them, are fitted again

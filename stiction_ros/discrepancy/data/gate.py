@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.filled import drawn, held
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
-from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE, OUTLYING, TRACE
+from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE, OFTEN, OUTLYING, TRACE
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
 from stiction_ros.effects.behaviour import BoolArray, IntArray
@@ -20,8 +20,6 @@ from stiction_ros.signals.holds import stretches
 
 SHOWN = (Freeze, Clip, Quantisation)
 """What is looked for here."""
-LONGEST_REST = 12
-ENDS = 6
 COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a finding
 
 
@@ -188,7 +186,7 @@ class _Rests:
         """How often a value is repeated that rests longer than by chance."""
         share = self.share
         natural = math.log(max(self.count, 3)) / math.log(1.0 / share) if share > 0.0 else 0.0
-        return LONGEST_REST + 3.0 * natural
+        return OFTEN + 3.0 * natural
 
 
 def _frozen(
@@ -242,7 +240,7 @@ def _clipped(
         stands = len(begins) > 1 or (  # one that leaps was frozen
             count >= rests.by_no_chance and not _leaps(values, begins[0], behind[0] - 1)
         )
-        if count >= ENDS and stands and count > 3 * beside:
+        if count >= OFTEN and stands and count > 3 * beside:
             where |= at
             ends += 1
             gain += 2.0 * count * math.log(len(values) / 10.0)

@@ -10,13 +10,12 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.discrepancy.measures import MAJORITY, MARGIN, SLIGHT, SURE
+from stiction_ros.discrepancy.measures import MAJORITY, MARGIN, OFTEN, SLIGHT, SURE
 from stiction_ros.discrepancy.simulation.free_run import HELD_SHARE, FreeRun
 from stiction_ros.effects import Backlash, Stiction, about
 
 JUMP_ABSENT = 5.0
 """BIC by which there is no jump: of the 7 that its figure costs in 1500 samples chance gains 2."""
-OFTEN = 8  # departures from rest that must show no jump before it is said to be absent
 FRICTION = "friction"  # families of effects
 LAGS = "lag"
 DOUBTFUL = 3.0  # standard deviations
