@@ -10,7 +10,7 @@ import numpy as np
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
-from stiction_ros.discrepancy.measures import NEARLY_ALL, SIDES, TRACE
+from stiction_ros.discrepancy.measures import NEARLY_ALL, SIDES, TRACE, TRIED
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import (
     Axis,
@@ -34,7 +34,6 @@ A_FREQUENCY = 3
 """Figures that a frequency counts as: what n samples tell of it grows with n³, of others with n
 (P. M. Djurić, A model selection rule for sinusoids in white Gaussian noise, IEEE Transactions on
 Signal Processing 44, 1996)."""
-PEAKS, STANDING_OUT = 6, 3
 NEIGHBOURS = 51  # frequencies, half a spectral line apart, whose median a line is held against
 SURPRISES = 12
 _TURN = 2.0 * math.pi
@@ -319,9 +318,9 @@ def spectral_lines(values: list[FloatArray], lowest: float) -> FloatArray:
         frequency = np.arange(len(power)) / (2.0 * len(each))
         outside = (frequency < lowest) | (frequency > FASTEST)
         beside = np.maximum(median_filter(power, NEIGHBOURS, mode="nearest"), TINY)
-        for sizes, count in ((power, PEAKS), (power / beside, STANDING_OUT)):
+        for sizes in (power, power / beside):
             sizes[outside] = 0.0
-            for _ in range(count):
+            for _ in range(TRIED):
                 peak = int(np.argmax(sizes))
                 found.append(float(frequency[peak]))
                 sizes[max(peak - 3, 0) : peak + 4] = 0.0

@@ -19,10 +19,9 @@ from stiction_ros.discrepancy.likelihood.noise import (
     noise_forms,
     shared_factors,
 )
-from stiction_ros.discrepancy.measures import SCATTERED, SIDES, SURE
+from stiction_ros.discrepancy.measures import SCATTERED, SIDES, SURE, TRIED
 from stiction_ros.effects import Behaviour, FloatArray
 
-LEADERS = 4  # points that are looked at further, under each guess of the noise
 SLOW = np.array([0.8])
 SHRINK = 0.4
 GENERATIONS = 40  # how often the points of a needle breed
@@ -74,7 +73,7 @@ def fit_candidate(
     """
     search = _Search(base, gap, candidate)
     if around is None:
-        centres = search.coarse()[:LEADERS]
+        centres = search.coarse()[:TRIED]
     else:
         search.judge(around, candidate.respond(base.run, around[None, :]))
         centres = [candidate.coordinates(around)]
@@ -142,7 +141,7 @@ class _Search:
             if before is None:
                 tried += [squares for _, squares in self.misfits]
             for squares in tried:
-                for point in self.candidate.apart(grid, squares, LEADERS):
+                for point in self.candidate.apart(grid, squares, TRIED):
                     if point not in leaders:
                         fit = self.judge(values[point], response.pick(point))
                         leaders[point] = fit.delta_bic
@@ -157,7 +156,7 @@ class _Search:
         """Return the best points of the first grid under noises that blur sharp peaks."""
         grid, found = self.candidate.grid(), []
         for ar, squares in self.misfits:
-            found += [(ar, grid[k]) for k in self.candidate.apart(grid, squares, LEADERS)]
+            found += [(ar, grid[k]) for k in self.candidate.apart(grid, squares, TRIED)]
         return found
 
     def refine(self, centre: FloatArray, size: float, under: Under | None = None) -> None:
@@ -218,7 +217,7 @@ class _Search:
         halton = halton_sequence(len(self.candidate.axes), seed=0)
         white = dict.fromkeys(range(len(self.base.noise)), NO_MEMORY)
         for under in (white, None):  # None: under the noise of the best fit so far
-            leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:LEADERS]
+            leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:TRIED]
             first = halton.random(SCATTERED)
             first[: len(leading)] = [self.needle.cube(fit.point) for fit in leading]
             found = differential_evolution(
