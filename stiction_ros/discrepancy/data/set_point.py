@@ -13,6 +13,7 @@ from scipy.linalg import solveh_banded
 
 from stiction_ros.discrepancy.data.scans import between_samples
 from stiction_ros.discrepancy.measures import (
+    GAUSS_NEWTON,
     MAJORITY,
     NEARLY_ALL,
     NORMAL_OF_MEDIAN,
@@ -23,8 +24,6 @@ from stiction_ros.discrepancy.simulation.free_run import FEWEST, Runs
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel, PiTuning
 from stiction_ros.signals.holds import stretches
-
-TURNS = 30  # of the weights that make the sum of sizes least
 
 
 @dataclasses.dataclass(frozen=True)
@@ -152,7 +151,7 @@ def _law(
     nothing = ROUNDING * float(np.abs(wanted).max())
     if tuning is None:
         law, weights = np.zeros(2), np.ones(len(wanted))
-        for _ in range(TURNS):
+        for _ in range(GAUSS_NEWTON):
             law[:] = np.linalg.lstsq(columns * weights[:, None], wanted * weights, rcond=None)[0]
             left = np.abs(wanted - columns @ law)
             weights = 1.0 / np.sqrt(np.maximum(left, nothing))

@@ -19,17 +19,15 @@ from stiction_ros.discrepancy.likelihood.noise import (
     noise_forms,
     shared_factors,
 )
-from stiction_ros.discrepancy.measures import SCATTERED, SIDES, SURE, TRIED
+from stiction_ros.discrepancy.measures import FINE_ROUNDS, ROUNDS, SCATTERED, SIDES, SURE, TRIED
 from stiction_ros.effects import Behaviour, FloatArray
 
 SLOW = np.array([0.8])
 SHRINK = 0.4
 GENERATIONS = 40  # how often the points of a needle breed
-BOXES = tuple(0.6**k for k in range(10))  # around the best point, of the largest
+BOXES = tuple(0.6**k for k in range(FINE_ROUNDS))  # around the best point, of the largest
 THROWN = 1500  # points in a box
-GAP_SEARCH_ROUNDS = 5
 FAIR = 3  # rounds after which a start that is surely behind is given up
-POLISHES = 8
 NEXT_TO_NOTHING = 0.02  # BIC
 NO_MEMORY = np.zeros(0)
 
@@ -168,7 +166,7 @@ class _Search:
             self._try(self.candidate.grid())
             return
         best = self._try(np.array([centre]), self.found, under)
-        for done in range(GAP_SEARCH_ROUNDS):
+        for done in range(ROUNDS):
             if done >= FAIR and best[1].delta_bic < self.best().delta_bic - SURE:
                 break
             best = self._around(best, size, under)
@@ -179,8 +177,8 @@ class _Search:
         if not self.candidate.axes or self.best().delta_bic <= 0.0:
             return
         best = self.candidate.coordinates(self.best().point), self.best()
-        size = 0.7 * SHRINK**GAP_SEARCH_ROUNDS
-        for _ in range(POLISHES):
+        size = 0.7 * SHRINK**ROUNDS
+        for _ in range(FINE_ROUNDS):
             better = self._around(best, size)
             if better[1].delta_bic < best[1].delta_bic + NEXT_TO_NOTHING:
                 size *= SHRINK

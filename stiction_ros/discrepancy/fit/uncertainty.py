@@ -12,11 +12,18 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit, settled
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.likelihood.noise import given_noise, information, shared_factors
-from stiction_ros.discrepancy.measures import CONFIDENCE, PROBE, SCATTERED, SLIGHT, SMOOTH, STEPPED
+from stiction_ros.discrepancy.measures import (
+    CONFIDENCE,
+    FINE_ROUNDS,
+    PROBE,
+    SCATTERED,
+    SLIGHT,
+    SMOOTH,
+    STEPPED,
+)
 from stiction_ros.effects import FloatArray
 from stiction_ros.signals.autoregression import TINY, coloured
 
-BOXES = 10
 FARTHEST = 1.5  # times the difference of two points, by which another one moves
 SHOWN = 20
 
@@ -48,7 +55,7 @@ class Region:
         halton, random = halton_sequence(len(free), seed=0), np.random.default_rng(0)
         points, scores = np.zeros((0, len(axes))), np.zeros(0)
         kept = points
-        for _ in range(BOXES):
+        for _ in range(FINE_ROUNDS):
             thrown = np.tile(centre, (SCATTERED + 1, 1))
             thrown[1:, free] += width * (2.0 * halton.random(SCATTERED) - 1.0)
             if len(kept) > len(free):

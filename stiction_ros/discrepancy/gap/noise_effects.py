@@ -13,11 +13,11 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_laws import Block, Law, declared_block, laws_of
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise, steady_gain
 from stiction_ros.discrepancy.likelihood.least_squares import left_by_columns
-from stiction_ros.discrepancy.measures import MARGIN, NORMAL, SMOOTH, SURE, SURPRISE, TRACE
+from stiction_ros.discrepancy.measures import MARGIN, NORMAL, ROUNDS, SMOOTH, SURE, SURPRISE, TRACE
 from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
 from stiction_ros.signals.autoregression import TINY
 
-POINTS, LATTICES = 13, 4  # of a lattice along each figure, and how many are laid
+POINTS = 13  # of a lattice along each figure
 FALLS = 4.0  # by which the bound falls from lattice to lattice
 CLEAR = 0.3  # by which the logarithm of a figure has to be inside of its range
 NO_LAW = MARGIN + SURE  # BIC by which a law may miss an autoregression and still be its name
@@ -145,7 +145,7 @@ class _Judge:
         misses the bottom of a narrow valley, so coarse lattices reject less than fine ones.
         """
         low, high = law.range
-        for turn in reversed(range(LATTICES)):
+        for turn in reversed(range(ROUNDS)):
             step = (high - low) / (POINTS - 1)
             meshed = np.meshgrid(*np.linspace(low, high, POINTS).T, indexing="ij")
             points = np.stack([each.ravel() for each in meshed], axis=1)

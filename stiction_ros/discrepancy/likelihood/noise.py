@@ -15,7 +15,7 @@ from stiction_ros.discrepancy.likelihood.least_squares import (
     whitened_columns,
 )
 from stiction_ros.discrepancy.likelihood.slow_noise import FIGURES, slow_beside_white
-from stiction_ros.discrepancy.measures import MARGIN, NEGLIGIBLE, ROUNDING, SURPRISE
+from stiction_ros.discrepancy.measures import MARGIN, NEGLIGIBLE, ROUNDING, ROUNDS, SURPRISE
 from stiction_ros.effects import FloatArray
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.signals.autoregression import (
@@ -27,7 +27,6 @@ from stiction_ros.signals.autoregression import (
 )
 
 MAX_ORDER = 6
-NOISE_FIT_ROUNDS = 4
 SETTLED = 1e-3  # BIC
 
 
@@ -103,7 +102,7 @@ def fit_noise(
     """
     ar = np.zeros(0) if start is None else start
     best: tuple[float, FloatArray, FloatArray, FloatArray] | None = None
-    for _ in range(NOISE_FIT_ROUNDS):
+    for _ in range(ROUNDS):
         beta, residual = _linear_part(target, columns, blocks.train, ar)
         fitted, score = best_autoregression(residual, blocks.train, MAX_ORDER)
         if best is not None and score >= best[0] - SETTLED:
@@ -126,7 +125,7 @@ def _remembering(
     An autoregression needs many terms for what two figures say, and ends before the noise forgets.
     """
     best = short
-    for _ in range(NOISE_FIT_ROUNDS):
+    for _ in range(ROUNDS):
         ar = slow_beside_white(best.residual, blocks.train)
         left = given_noise(target, columns, blocks, ar)
         price = FIGURES * math.log(max(left.rows, 2))
