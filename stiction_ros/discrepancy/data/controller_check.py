@@ -12,6 +12,7 @@ from stiction_ros.discrepancy.data.scans import Scans, errors_of, law_terms, sca
 from stiction_ros.discrepancy.data.set_point import told_set_points
 from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
 from stiction_ros.discrepancy.measures import (
+    LARGER,
     LONGEST_DELAY,
     NEARLY_ALL,
     NEGLIGIBLE,
@@ -25,7 +26,6 @@ from stiction_ros.loop import LoopModel, PiTuning
 
 ONCE = 5e-3  # of the moves of OP, that a law leaves which scans once
 TWICE = 0.1  # of the moves of OP, that one scan leaves of a law which scans twice
-ROUNDED = 1.2  # times what rounding of the signals leaves
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
 
 
@@ -181,7 +181,7 @@ def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
         known = laws[0].left < NEGLIGIBLE
         return ControllerCheck(ControllerStatus.SAME, None, own, known)
     law = laws[best]
-    if law.left > max(NEGLIGIBLE, ROUNDED * _rounding(runs, law)):
+    if law.left > max(NEGLIGIBLE, LARGER * _rounding(runs, law)):
         return ControllerCheck(ControllerStatus.UNEXPLAINED, None, law.left, False)
     if recorded is None and best == 0:
         rounded = quantum_of(runs.op[:, 0]) > 0.0
@@ -210,7 +210,7 @@ class _Law:
 
 def _scans(model: LoopModel, runs: Runs, law: _Law) -> Scans | None:
     """Return the law of a controller that scans twice, where one scan does not give OP."""
-    if law.left <= max(ROUNDED * _rounding(runs, law), ONCE):
+    if law.left <= max(LARGER * _rounding(runs, law), ONCE):
         return None
     found = scanned_twice(model, runs)
     if found is None or model.controller is None or _alike(model.controller, found):

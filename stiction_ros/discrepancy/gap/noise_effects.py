@@ -13,13 +13,21 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_laws import Block, Law, declared_block, laws_of
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise, steady_gain
 from stiction_ros.discrepancy.likelihood.least_squares import left_by_columns
-from stiction_ros.discrepancy.measures import MARGIN, NORMAL, ROUNDS, SMOOTH, SURE, SURPRISE, TRACE
+from stiction_ros.discrepancy.measures import (
+    LARGER,
+    MARGIN,
+    NORMAL,
+    ROUNDS,
+    SMOOTH,
+    SURE,
+    SURPRISE,
+    TRACE,
+)
 from stiction_ros.effects import Behaviour, ColouredDisturbance, FloatArray, RandomWalkDisturbance
 from stiction_ros.signals.autoregression import TINY
 
 POINTS = 13  # of a lattice along each figure
-FALLS = 4.0  # by which the bound falls from lattice to lattice
-CLEAR = 0.3  # by which the logarithm of a figure has to be inside of its range
+CLEAR = math.log(LARGER)  # by which the logarithm of a figure has to be inside of its range
 NO_LAW = MARGIN + SURE  # BIC by which a law may miss an autoregression and still be its name
 
 
@@ -151,7 +159,8 @@ class _Judge:
             points = np.stack([each.ravel() for each in meshed], axis=1)
             scores = [self.score(law.block(point)) for point in points]
             fitted = np.array([score.fitted for score in scores])
-            kept = points[fitted - fitted.min() <= SMOOTH * FALLS ** max(turn - 1, 0)]
+            bound = SMOOTH if turn <= 1 else SURE
+            kept = points[fitted - fitted.min() <= bound]
             low = np.maximum(kept.min(axis=0) - step, law.range[0])
             high = np.minimum(kept.max(axis=0) + step, law.range[1])
         return points, scores
