@@ -19,7 +19,15 @@ from stiction_ros.discrepancy.likelihood.noise import (
     noise_forms,
     shared_factors,
 )
-from stiction_ros.discrepancy.measures import FINE_ROUNDS, ROUNDS, SCATTERED, SIDES, SURE, TRIED
+from stiction_ros.discrepancy.measures import (
+    FINE_ROUNDS,
+    ROUNDS,
+    SCATTERED,
+    SETTLED,
+    SIDES,
+    SURE,
+    TRIED,
+)
 from stiction_ros.effects import Behaviour, FloatArray
 
 SLOW = np.array([0.8])
@@ -28,7 +36,6 @@ GENERATIONS = 40  # how often the points of a needle breed
 BOXES = tuple(0.6**k for k in range(FINE_ROUNDS))  # around the best point, of the largest
 THROWN = 1500  # points in a box
 FAIR = 3  # rounds after which a start that is surely behind is given up
-NEXT_TO_NOTHING = 0.02  # BIC
 NO_MEMORY = np.zeros(0)
 
 Under = Mapping[int, FloatArray]  # φ of an output's noise
@@ -180,7 +187,7 @@ class _Search:
         size = 0.7 * SHRINK**ROUNDS
         for _ in range(FINE_ROUNDS):
             better = self._around(best, size)
-            if better[1].delta_bic < best[1].delta_bic + NEXT_TO_NOTHING:
+            if better[1].delta_bic < best[1].delta_bic + SETTLED:
                 size *= SHRINK
             best = better
 

@@ -15,7 +15,14 @@ from stiction_ros.discrepancy.likelihood.least_squares import (
     whitened_columns,
 )
 from stiction_ros.discrepancy.likelihood.slow_noise import FIGURES, slow_beside_white
-from stiction_ros.discrepancy.measures import MARGIN, NEGLIGIBLE, ROUNDING, ROUNDS, SURPRISE
+from stiction_ros.discrepancy.measures import (
+    MARGIN,
+    NEGLIGIBLE,
+    ROUNDING,
+    ROUNDS,
+    SETTLED,
+    SURPRISE,
+)
 from stiction_ros.effects import FloatArray
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.signals.autoregression import (
@@ -27,7 +34,6 @@ from stiction_ros.signals.autoregression import (
 )
 
 MAX_ORDER = 6
-SETTLED = 1e-3  # BIC
 
 
 @dataclasses.dataclass(frozen=True)
