@@ -7,14 +7,12 @@ from typing import Self
 
 import numpy as np
 
+from stiction_ros.discrepancy.measures import ROUNDING
 from stiction_ros.discrepancy.simulation.between import beyond_samples
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Axis, Behaviour, FloatArray, Seen, about
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.signals.autoregression import TINY
-
-_RANKED = 200  # points of a grid that may be among the best ones
-_NEIGHBOURS = 1.5  # steps of the first grid
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,9 +125,9 @@ class Candidate(ABC):
         """
         steps = np.array([max(axis.spacing, TINY) for axis in self.axes])
         chosen: list[int] = []
-        for place in np.argsort(loss, kind="stable")[:_RANKED].tolist():
+        for place in np.argsort(loss, kind="stable").tolist():
             away = [np.abs((coordinates[place] - coordinates[k]) / steps) for k in chosen]
-            if all(each.max(initial=0.0) > _NEIGHBOURS for each in away):
+            if all(each.max(initial=0.0) > 1.0 + ROUNDING for each in away):
                 chosen.append(place)
             if len(chosen) == most:
                 break
