@@ -14,7 +14,7 @@ from stiction_ros.discrepancy.candidate.base import (
     between_axes,
     lag_axis,
 )
-from stiction_ros.discrepancy.measures import NEGLIGIBLE, ROUNDING, SLIGHT
+from stiction_ros.discrepancy.measures import ALONG, NEGLIGIBLE, ROUNDING, SLIGHT
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
 from stiction_ros.effects import (
     Axis,
@@ -33,7 +33,6 @@ from stiction_ros.effects import (
 from stiction_ros.effects.behaviour import BoolArray
 
 SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best point
-STATIONS = 101  # of the travel of a valve, at which its curve has to rise
 AT_REST = 1.0 - ROUNDING  # of half a deadband, how far off OP a stem rests at its edge
 SHORT_OF_A_SLIP = 0.98  # of f_S; where there is a jump it rests at f_D, well inside
 
@@ -216,9 +215,9 @@ class CubicCandidate(ValveCandidate):
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
         """Refuse curves that are straight where OP moves, or fall."""
-        travel = np.linspace(self.low, self.high, STATIONS)
+        travel = np.linspace(self.low, self.high, ALONG)
         curve = travel + CubicCharacteristic.shapes(travel) @ point
-        chord = np.linspace(curve[0], curve[-1], STATIONS)
+        chord = np.linspace(curve[0], curve[-1], ALONG)
         bent = np.abs(curve - chord).max() >= NEGLIGIBLE * abs(curve[-1] - curve[0])
         return bool(bent and np.all(np.diff(curve) > 0.0))
 

@@ -13,6 +13,7 @@ from stiction_ros.discrepancy.fit.misfit import misfit, settled
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.likelihood.noise import given_noise, information, shared_factors
 from stiction_ros.discrepancy.measures import (
+    ALL_AROUND,
     CONFIDENCE,
     FINE_ROUNDS,
     PROBE,
@@ -25,7 +26,6 @@ from stiction_ros.effects import FloatArray
 from stiction_ros.signals.autoregression import TINY, coloured
 
 FARTHEST = 1.5  # times the difference of two points, by which another one moves
-SHOWN = 20
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Region:
     def shown(self) -> "Region":
         """Return the points that are extreme in one figure, the best ones, and some between."""
         ends = np.concatenate([self.points.argmin(axis=0), self.points.argmax(axis=0)])
-        between = np.linspace(0, len(self.points) - 1, SHOWN).astype(int)
+        between = np.linspace(0, len(self.points) - 1, ALL_AROUND).astype(int)
         some = np.unique(np.concatenate([ends, between]))
         return Region(self.points[some], self.excess[some])
 
@@ -88,8 +88,6 @@ def scored(
     response = fit.candidate.respond(base.run, fit.candidate.values(points))
     return points, misfit(base, base.run.gap, response, ar)
 
-
-AROUND = 16  # points of an ellipse
 
 Intervals = dict[str, tuple[float, float]]
 
@@ -225,7 +223,7 @@ def _factor_sides(base: Baseline, fit: CandidateFit, point: FloatArray) -> Float
     values, axes = np.linalg.eigh(np.linalg.pinv(np.sum(known, axis=0)))
     root = axes * np.sqrt(np.maximum(values, 0.0))
     if len(values) == 2:
-        turns = 2.0 * np.pi * np.arange(AROUND) / AROUND
+        turns = 2.0 * np.pi * np.arange(ALL_AROUND) / ALL_AROUND
         return np.asarray(np.column_stack([np.cos(turns), np.sin(turns)]) @ root.T)
     spread = np.sqrt(np.maximum(np.sum(root**2, axis=1), 0.0))
     ends = (root @ root.T) / np.where(spread > 0.0, spread, 1.0)

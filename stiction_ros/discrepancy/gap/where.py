@@ -12,7 +12,6 @@ from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.signals.holds import set_point_moves
 from stiction_ros.texts import spoken
 
-KNOTS = 60
 WEIGHTS = 10.0 ** np.arange(-3.0, 4.0)
 
 
@@ -142,7 +141,7 @@ def _tracks(base: Baseline) -> list[Track]:
 def _hats(base: Baseline) -> FloatArray:
     """Return piecewise linear functions of time, shape (N, K)."""
     count = len(base.run.runs)
-    at = np.linspace(0.0, count - 1.0, min(KNOTS, max(count // 10, 3)))
+    at = np.linspace(0.0, count - 1.0, max(2 * count // base.run.runs.block, 3))
     width = at[1] - at[0]
     rows = np.arange(count)[:, None]
     return np.asarray(np.maximum(1.0 - np.abs(rows - at) / width, 0.0))

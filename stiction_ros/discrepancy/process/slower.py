@@ -8,12 +8,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_ros.discrepancy.measures import EPSILON, NEGLIGIBLE, ROUNDING
+from stiction_ros.discrepancy.measures import ALONG, EPSILON, NEGLIGIBLE, ROUNDING
 from stiction_ros.effects import FloatArray
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, Process
 from stiction_ros.processes.sampled import pulses
 
-FRACTIONS = 41  # of a sample, at which the dead time's is looked for
 EXACT = (
     EPSILON**0.5
 )  # of b, that the continuous plant may miss, and of a numerator: half the digits
@@ -60,7 +59,7 @@ def held(denominator: tuple[float, ...], b: tuple[float, ...]) -> Held | None:
     if len(b) <= count:
         fraction = 0.0
     else:
-        grid = np.linspace(0.0, 1.0, FRACTIONS)
+        grid = np.linspace(0.0, 1.0, ALONG)
         tried = [left(float(each)) for each in grid]
         best, width = float(grid[int(np.argmin(tried))]), float(grid[1])
         inside = (max(best - width, 0.0), min(best + width, 1.0))
