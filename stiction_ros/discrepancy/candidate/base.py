@@ -250,22 +250,12 @@ def spans_of(figures: Sequence[Mapping[str, float]]) -> dict[str, tuple[float, f
     return {key: (min(f[key] for f in figures), max(f[key] for f in figures)) for key in figures[0]}
 
 
-LEAST_LAG = 2.5  # times the shortest lag that is searched, a fifth of a sample
-
-
 class Lagging(Candidate):
     """A lag by its time constant, where it begins, and how far it goes on between samples."""
 
     def count(self, point: FloatArray) -> int:
         """Return how many figures count: not where it begins, but how far it goes on."""
         return max(len(point) - 1, 1)
-
-    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
-        """Tell whether it is longer than half a sample.
-
-        Between samples a signal moves on: less than one of them may be the sampling's own.
-        """
-        return float(point[0]) >= LEAST_LAG * self.axes[0].low
 
     def between(
         self, run: FreeRun, points: FloatArray, output: int, valve: int | None = None
@@ -292,9 +282,12 @@ class Lagging(Candidate):
 
 
 def lag_axis(run: FreeRun) -> Axis:
-    """Return the range of time constants that a record tells."""
+    """Return the range of time constants that a record tells, from half a sample on.
+
+    Between samples a signal moves on: less than one of them may be the sampling's own.
+    """
     step = run.runs.sample_time
-    return Axis(0.2 * step, max(len(run.runs) / 8.0, 2.0) * step, 20, logarithmic=True)
+    return Axis(0.5 * step, max(len(run.runs) / 8.0, 2.0) * step, 20, logarithmic=True)
 
 
 def between_axes(asked: bool) -> tuple[Axis, ...]:
