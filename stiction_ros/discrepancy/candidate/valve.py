@@ -33,8 +33,7 @@ from stiction_ros.effects import (
 from stiction_ros.effects.behaviour import BoolArray
 
 SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best point
-AT_REST = 1.0 - ROUNDING  # of half a deadband, how far off OP a stem rests at its edge
-SHORT_OF_A_SLIP = 0.98  # of f_S; where there is a jump it rests at f_D, well inside
+AT_REST = 1.0 - ROUNDING  # of half a deadband or of f_S, how far off OP a stem rests at most
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -110,7 +109,7 @@ class StictionCandidate(ValveCandidate):
         return np.column_stack([points[:, 0], points[:, 0] * points[:, 1]])
 
     def lead(self, point: FloatArray) -> float:
-        return SHORT_OF_A_SLIP * float(point[0] * point[2])
+        return AT_REST * float(point[0] * point[2])
 
     def count(self, point: FloatArray) -> int:
         return 2
