@@ -14,7 +14,7 @@ from stiction_ros.discrepancy.candidate.base import (
     between_axes,
     lag_axis,
 )
-from stiction_ros.discrepancy.measures import ALONG, NEGLIGIBLE, ROUNDING, SLIGHT
+from stiction_ros.discrepancy.measures import ALONG, NEGLIGIBLE, QUARTER, ROUNDING, SLIGHT
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
 from stiction_ros.effects import (
     Axis,
@@ -32,7 +32,6 @@ from stiction_ros.effects import (
 )
 from stiction_ros.effects.behaviour import BoolArray
 
-SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best point
 AT_REST = 1.0 - ROUNDING  # of half a deadband or of f_S, how far off OP a stem rests at most
 
 
@@ -140,10 +139,10 @@ class StictionCandidate(ValveCandidate):
         Args:
             point: values, shape (axes,).
             cubes: points between 0 and 1, shape (G, axes).
-            size: of the box, 1 for the largest.
+            size: of the box, 1 for the largest, a quarter to either side.
         """
         span = math.log(self.axes[0].high / self.axes[0].low)
-        around = size * np.array([SUM_BOX / span, JUMP_BOX]) * (2.0 * cubes[:, :2] - 1.0)
+        around = QUARTER * size * np.array([1.0 / span, 1.0]) * (2.0 * cubes[:, :2] - 1.0)
         near = np.clip(self.cube(point)[:2] + around, 0.0, 1.0)
         return self.of_cube(np.column_stack([near, cubes[:, 2]]))
 
