@@ -25,7 +25,6 @@ from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
 
 ONCE = 5e-3  # of the moves of OP, that a law leaves which scans once
-TWICE = 0.1  # of the moves of OP, that one scan leaves of a law which scans twice
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
 
 
@@ -150,11 +149,10 @@ def _told_by(model: LoopModel, runs: Runs, scans: int) -> ControllerCheck:
     if told is None:
         return NOT_ASKED
     check = _compared(dataclasses.replace(model, controller=told.tuning), told.runs)
-    most = NEGLIGIBLE if check.scans is None else TWICE
-    if check.status is not ControllerStatus.SAME or check.left > most:
+    if check.status is not ControllerStatus.SAME:
         return NOT_ASKED
     if check.scans is None:
-        return check
+        return check if check.left <= NEGLIGIBLE else NOT_ASKED
     error = check.scans.gain * told.error
     return dataclasses.replace(check, unsure=Unseen(error**2, 1.0 - 1.0 / told.rest))
 
