@@ -32,7 +32,8 @@ from stiction_ros.effects import (
 )
 from stiction_ros.effects.behaviour import BoolArray
 
-AT_REST = 1.0 - ROUNDING  # of half a deadband or of f_S, how far off OP a stem rests at most
+AT_REST = 1.0 - ROUNDING  # of half a deadband, how far off OP a stem rests at its edge
+SHORT_OF_A_SLIP = 0.98  # of f_S; where there is a jump it rests at f_D, well inside
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -108,7 +109,7 @@ class StictionCandidate(ValveCandidate):
         return np.column_stack([points[:, 0], points[:, 0] * points[:, 1]])
 
     def lead(self, point: FloatArray) -> float:
-        return AT_REST * float(point[0] * point[2])
+        return SHORT_OF_A_SLIP * float(point[0] * point[2])
 
     def count(self, point: FloatArray) -> int:
         return 2
