@@ -307,8 +307,7 @@ class LiveController:
             self._note(controller.raised, sample)
         given_up = result.mode is ControlMode.HOLD and controller.mode is not ControlMode.HOLD
         if given_up and not self._given_up:
-            change = ModeChange(sample, ControlMode.HOLD, result.reason, self._known.name)
-            self.changes.append(change)
+            self._note(result.reason, sample, ControlMode.HOLD)
         elif self._given_up and not given_up:
             self._note("a plan is found again", sample)
         self._given_up = given_up
@@ -371,9 +370,10 @@ class LiveController:
         self._controller, self._known = controller, change.model
         self._note(change.reason, self._sample)
 
-    def _note(self, reason: str, sample: int) -> None:
-        mode = self._controller.mode
-        self.changes.append(ModeChange(sample, mode, reason, self._known.name))
+    def _note(self, reason: str, sample: int, mode: ControlMode | None = None) -> ModeChange:
+        change = ModeChange(sample, mode or self._controller.mode, reason, self._known.name)
+        self.changes.append(change)
+        return change
 
     def _roll_back(self, reason: str) -> None:
         """Return to the controller that was in force before the trial, on what it knew."""

@@ -136,10 +136,7 @@ class ValveTestingController(LiveController):
         margin, hold = self.settings.jump_margin, round(facts.hold / step)
         self.test = ValveTest(facts.within(reach, room), hold, self._background, margin)
         self._sp = sp
-        begun = ModeChange(
-            self._sample, ControlMode.VALVE_TEST, "a valve test begins", self._known.name
-        )
-        self.changes.append(begun)
+        self._note("a valve test begins", self._sample, ControlMode.VALVE_TEST)
 
     def _noise(self) -> FloatArray:
         """Return the standard deviation of the noise of each PV, shape (p,)."""
@@ -157,11 +154,7 @@ class ValveTestingController(LiveController):
         assert self.test is not None
         self._first, self._approach = True, None
         self._watch.disturb()
-        change = ModeChange(
-            self._sample, self._controller.mode, f"valve test: {self.test.over}", self._known.name
-        )
-        self.changes.append(change)
-        self.tested = change
+        self.tested = self._note(f"valve test: {self.test.over}", self._sample)
         found = self.test.judgement
         if found is None or not found.verdict.has_friction:
             return

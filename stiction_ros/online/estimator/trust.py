@@ -153,10 +153,9 @@ class ValveTrust:
         if self._disjoint_windows < self.rule.contradictions:
             return
         if said is VerdictKind.STICKY:
-            self.trusted, self._disjoint_windows = found, 0
+            self.renew(found)
         elif said is VerdictKind.HEALTHY:
-            self.trusted, self._pending = None, None
-            self._found_windows = self._disjoint_windows = 0
+            self.renew(None)
 
 
 def alike(one: Mapping[str, TrustedFriction], other: Mapping[str, TrustedFriction]) -> bool:
