@@ -117,17 +117,13 @@ def static_interval(
     grid = np.column_stack([static * FINE_SHARES, np.full(len(FINE_SHARES), dynamic)])
     grid[:, 1] = np.minimum(grid[:, 1], grid[:, 0])
     gains, left = _gains(evidence, valve, first, grid)
-    credible = gains >= gains.max() - _slack(float(gains.max())) * max(
-        1.0, float(left[int(np.argmax(gains))])
-    )
-    low = high = int(np.argmax(gains))
-    while low > 0 and credible[low]:
-        low -= 1
-    while high < len(grid) - 1 and credible[high]:
-        high += 1
-    # Beyond the grid anything goes, for all that these samples say.
-    ends = (0.0 if credible[low] else grid[low, 0]), (np.inf if credible[high] else grid[high, 0])
-    return float(ends[0]), min(float(ends[1]), float(STATIC_SHARES[-1]) * static)
+    best = int(np.argmax(gains))
+    least = gains[best] - _slack(float(gains[best])) * max(1.0, float(left[best]))
+    # Without a rejected one on a side anything goes there, for all that these samples say.
+    rejected = grid[gains < least, 0]
+    low = rejected[rejected < grid[best, 0]].max(initial=0.0)
+    high = rejected[rejected > grid[best, 0]].min(initial=STATIC_SHARES[-1] * static)
+    return float(low), float(high)
 
 
 def _slack(gain: float) -> float:
