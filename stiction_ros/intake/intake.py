@@ -270,7 +270,7 @@ def _loop(name: str, read: Sequence[_Signals]) -> Loop:
 
 def _options_of(name: str, read: Sequence[_Signals]) -> IntakeOptions:
     """Return the options of a loop, of which several files may hold signals."""
-    units = {t.way.op_unit(name, single=t.plan.single) for t, block in read if block.of("op")}
+    units = {table.way.op_unit(name) for table, block in read if block.of("op")}
     steps = {table.way.options.sample_time for table, _ in read}
     for what, said in (("unit of OP", units), ("sample time", steps)):
         if len(said) > 1:

@@ -86,7 +86,7 @@ def _row(cells: Mapping[str, str], where: str) -> TagRow:
     if word and unit is None:
         raise _unknown("unit", f"{word!r} of OP", OpUnit, where)
     options = _options(cells, where) if file else {}
-    if file and not loop and unit is not None:
+    if file and not tags and unit is not None:
         options["op_unit"] = unit
     return TagRow(where, loop, tags if loop else (), unit, file, options)
 
@@ -133,15 +133,9 @@ class FileWay:
         """Return what a tag or the name of a column says, None when it says nothing."""
         return read_tag(name) if self.tags is None else self.tags.get(folded(name))
 
-    def op_unit(self, loop: str, *, single: bool) -> OpUnit | None:
-        """Return the unit of OP that is said of a loop; None takes it from the export.
-
-        Of a loop that is ``single`` in its file a row tells whatever name it has.
-        """
-        own = self.units.get(loop)
-        if own is None and single and len(self.units) == 1:
-            (own,) = self.units.values()
-        return own or self.options.op_unit or self.listed.get(loop)
+    def op_unit(self, loop: str) -> OpUnit | None:
+        """Return the unit of OP that is said of a loop; None takes it from the export."""
+        return self.units.get(loop) or self.options.op_unit or self.listed.get(loop)
 
 
 @dataclasses.dataclass(frozen=True)
