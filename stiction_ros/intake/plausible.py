@@ -117,17 +117,17 @@ def _fits(block: Block, unit: OpUnit, *, given: bool, named: bool) -> str:
 
 
 def refuse_twice(block: Block) -> None:
-    """Raise an :class:`InputError` where PV is OP at every sample: one tag is listed for both."""
-    pairs = itertools.product(block.of("op").items(), block.of("pv").items())
-    for (op, output), (pv, measured) in pairs:
-        there = output.values[np.isfinite(output.values)]
-        alike = np.array_equal(output.values, measured.values, equal_nan=True)
-        if alike and np.any(there != there[:1]):
+    """Raise an :class:`InputError` where PV is OP at every sample, or one column is named twice."""
+    for (key, one), (also, other) in itertools.combinations(block.of("op", "pv").items(), 2):
+        there = one.values[np.isfinite(one.values)]
+        moves, named = np.any(there != there[:1]), one.name == other.name
+        alike = np.array_equal(one.values, other.values, equal_nan=True)
+        if moves and alike and (named or key.signal != also.signal):
             raise InputError(
-                f"one signal is given twice: {measured.name} is {output.name} at all of "
+                f"one signal is given twice: {other.name} is {one.name} at all of "
                 f"{len(block.time)} samples",
-                fix=f"name each with --op {op.tag}=COLUMN --pv {pv.tag}=COLUMN, or "
-                "the tag with --tags F; export the one that is missing",
+                fix=f"name each with --{key.signal} {key.tag}=COLUMN --{also.signal} "
+                f"{also.tag}=COLUMN, or the tag with --tags F; export the one that is missing",
             )
 
 

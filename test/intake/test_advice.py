@@ -191,6 +191,7 @@ def test_swapped_signals(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
 def test_one_column_for_op_and_pv(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(tmp_path / "a.csv", text(table()))
     found = refused(path, capsys, "--op", "V1=OP", "--pv", "PV1=OP")
-    assert "OP is given twice, as OP V1 and as PV PV1; name another column for one" in found
+    assert "one signal is given twice: OP is OP at all of 120 samples; name each with" in found
+    assert "given twice" in refused(path, capsys, "--op", "V1=OP", "--op", "V2=OP")
     out = str(tmp_path / "out.csv")
     assert main(["convert", str(path), out, "--op", "V1=OP", "--pv", "PV1=PV"]) == 0

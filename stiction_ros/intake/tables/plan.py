@@ -163,15 +163,7 @@ def _one_loop(sheet: Sheet, options: IntakeOptions, top: Sequence[Cells]) -> Pla
     chosen: dict[Key, int] = {}
     for signal, mapping in (("op", op), ("pv", pv), ("sp", sp), ("stem", stem)):
         for tag, column in (mapping or {}).items():
-            place = sheet.column(column, f"--{signal} TAG=COLUMN")
-            for key, other in chosen.items():
-                if other == place and {key.signal, signal} <= {"op", "pv"}:
-                    raise InputError(
-                        f"{column} is given twice, as {key.signal.upper()} {key.tag} and as "
-                        f"{signal.upper()} {tag}",
-                        fix=f"name another column for one of them, {sheet.columns_said} {OR_ROW}",
-                    )
-            chosen[Key(signal, tag)] = place
+            chosen[Key(signal, tag)] = sheet.column(column, f"--{signal} TAG=COLUMN")
     clocks = _clocks(sheet, chosen.values(), options, top)
     name = _usual(sheet, "mode")
     mode = None if name is None else sheet.find(name)
