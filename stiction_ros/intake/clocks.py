@@ -191,11 +191,8 @@ def _in_one_time(blocks: Sequence[Block], zone: str, rules: Rules) -> list[Block
     known = changes(zone, np.concatenate([one.wall // DAY for one in rows]))
     if not zone:
         known += dict.fromkeys(change for one in rows for change in _others(one, known))
-    files = {}
-    for path in {block.path for block in blocks}:
-        every = _Rows.of(*(block for block in blocks if block.path == path))
-        if _falls_by(every, known):
-            files[path] = every
+    paths = dict.fromkeys(block.path for block in blocks)
+    files = {path: _Rows.of(*(b for b in blocks if b.path == path)) for path in paths}
     shifts = [np.zeros(len(one.wall)) for one in rows]
     for change in known:
         seen = any(len(one.seams(change)) for one in (*rows, *files.values()))
@@ -208,7 +205,7 @@ def _in_one_time(blocks: Sequence[Block], zone: str, rules: Rules) -> list[Block
             continue
         count = 0
         for block, one, shift in zip(blocks, rows, shifts, strict=True):
-            moved = _after(block, (one, files.get(block.path)), change)
+            moved = _after(block, (one, files[block.path]), change)
             shift[moved] += change.moves
             count += int(np.count_nonzero(moved))
         way = "on, both passes are kept" if change.back else "back"
@@ -241,20 +238,13 @@ def _others(one: _Rows, known: Sequence[Change]) -> list[Change]:
     return [Change(float(then), float(then) + HOUR, back=True)] if off <= 0.5 * one.usual else []
 
 
-def _falls_by(rows: _Rows, known: Sequence[Change]) -> bool:
-    """Return whether time falls at changes alone, as it does not where tags follow each other."""
-    seams = [rows.seams(change) for change in known if change.back]
-    falls = np.flatnonzero(np.diff(rows.wall) < 0.0) + 1
-    return not len(np.setdiff1d(falls, np.concatenate([[], *seams])))
-
-
-def _after(block: Block, told: Sequence[_Rows | None], change: Change) -> FlagArray:
+def _after(block: Block, told: Sequence[_Rows], change: Change) -> FlagArray:
     """Return the rows of a block that follow a change."""
     wall, (low, high) = block.clock.start + block.time, change[:2]
     if not change.back:
         return wall >= high
     for rows in told:
-        if rows is not None and len(seams := rows.seams(change)) == 1:
+        if len(seams := rows.seams(change)) == 1:
             late = _Rows.of(block).rank >= rows.rank[seams[0]]
             return np.asarray((wall > high) | (wall >= low) & late)
     inside = (wall >= low) & (wall < high)
