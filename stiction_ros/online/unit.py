@@ -119,27 +119,6 @@ def _parameters(top: Section, node: str) -> dict[str, Any]:
     return node_values(top.section(node, {}).section("ros__parameters", {}))
 
 
-class _Sessions:
-    """All loops behind the face that a simulated plant calls."""
-
-    def __init__(self, scenario: UnitScenario, identify: bool) -> None:
-        self.wiring = Wiring(scenario.simulated.plant, scenario.loops)
-        self.sessions = [
-            LoopSession(member, member.plant, identify) for member in scenario.members.values()
-        ]
-        self.op: list[list[FloatArray]] = [[] for _ in self.sessions]
-        self.sp: list[FloatArray] = []
-
-    def __call__(self, measurement: Measurement, sp: FloatArray) -> FloatArray:
-        wiring, given = self.wiring, []
-        self.sp.append(wiring.set_points(sp))
-        for loop, session, kept in zip(wiring.loops, self.sessions, self.op, strict=True):
-            seen = dataclasses.replace(measurement, pv=wiring.of(loop, measurement.pv))
-            given.append(session(seen, wiring.of(loop, self.sp[-1])))
-            kept.append(given[-1])
-        return wiring.take(given)
-
-
 def run_unit(
     scenario: UnitScenario,
     *,
@@ -164,11 +143,21 @@ def run_unit(
     Raises:
         InputError: a controller cannot be built from its process.
     """
-    sessions = _Sessions(scenario, identify)
     told = scenario.simulated.with_ideal_valves() if ideal_valves else scenario.simulated
-    run, model = told.run(sessions, seed, samples, progress), told.plant
-    wiring, sp, found = sessions.wiring, np.array(sessions.sp), {}
-    for loop, session, op in zip(wiring.loops, sessions.sessions, sessions.op, strict=True):
+    wiring, model = Wiring(scenario.simulated.plant, scenario.loops), told.plant
+    sessions = [LoopSession(one, one.plant, identify) for one in scenario.members.values()]
+    sp, op = list[FloatArray](), list[list[FloatArray]]()
+
+    def controllers(measurement: Measurement, scheduled: FloatArray) -> FloatArray:
+        sp.append(wiring.set_points(scheduled))
+        op.append([])
+        for loop, session in zip(wiring.loops, sessions, strict=True):
+            seen = dataclasses.replace(measurement, pv=wiring.of(loop, measurement.pv))
+            op[-1].append(session(seen, wiring.of(loop, sp[-1])))
+        return wiring.take(op[-1])
+
+    run, found = told.run(controllers, seed, samples, progress), {}
+    for loop, session, given in zip(wiring.loops, sessions, zip(*op, strict=True), strict=True):
         columns = [model.valve_names.index(tag) for tag in loop.valves if tag in model.valve_names]
         stem = run.record.stem if len(columns) == len(loop.valves) else None
         record = Record(
@@ -176,9 +165,9 @@ def run_unit(
             model.sample_time,
             loop.valves,
             loop.outputs,
-            np.array(op),
+            np.array(given),
             wiring.of(loop, run.record.pv),
-            wiring.of(loop, sp),
+            wiring.of(loop, np.array(sp)),
             None if stem is None else stem[:, columns],
         )
         found[loop.name] = session.told(ClosedLoopRun(record, wiring.of(loop, run.pv_clean)))
