@@ -29,44 +29,36 @@ class Window:
         """Start empty; ``sample_time`` in s, ``longest`` in samples."""
         self._loop, self._sample_time = loop, sample_time
         self._valves, self._outputs = tuple(valves), tuple(outputs)
-        self._op: deque[FloatArray] = deque(maxlen=longest)
-        self._pv: deque[FloatArray] = deque(maxlen=longest)
-        self._count = 0  # samples that were taken in
-        self._lacking: deque[int] = deque()  # which of them are not finite
+        # OP and PV of each, and whether either lacks
+        self._rows: deque[tuple[FloatArray, FloatArray, bool]] = deque(maxlen=longest)
 
     def __len__(self) -> int:
-        return len(self._op)
+        return len(self._rows)
 
     def resize(self, longest: int) -> None:
         """Hold ``longest`` samples from now on."""
-        self._op, self._pv = deque(self._op, longest), deque(self._pv, longest)
+        self._rows = deque(self._rows, longest)
 
     def keep(self, count: int) -> None:
         """Drop all but the last ``count`` samples."""
         while len(self) > count:
-            self._op.popleft(), self._pv.popleft()
+            self._rows.popleft()
 
     def add(self, op: FloatArray, pv: FloatArray) -> bool:
         """Take in a sample, OP (m,) and PV (p,); return whether the window holds it."""
-        self._op.append(np.array(op, dtype=float))
-        self._pv.append(np.array(pv, dtype=float))
-        self._count += 1
-        if np.isfinite(op).all() and np.isfinite(pv).all():
-            return True
-        self._lacking.append(self._count)
-        while self._lacking[0] <= self._count - len(self):
-            self._lacking.popleft()
-        many = len(self._lacking)
-        row = many > HELD and self._lacking[-1 - HELD] == self._count - HELD
-        if row or many > SLIGHT * len(self):
-            self.keep(0)
+        lacks = not (np.isfinite(op).all() and np.isfinite(pv).all())
+        self._rows.append((np.array(op, dtype=float), np.array(pv, dtype=float), lacks))
+        if lacks:
+            lacking = [row[2] for row in self._rows]
+            if sum(lacking) > SLIGHT * len(self) or sum(lacking[-1 - HELD :]) > HELD:
+                self.keep(0)
         return len(self) > 0
 
     def record(self, end: int) -> Record:
         """Return the samples up to the number ``end`` of the last one."""
-        op = np.array(self._op).reshape(-1, len(self._valves))
-        pv = np.array(self._pv).reshape(-1, len(self._outputs))
-        if self._lacking:
+        op = np.array([row[0] for row in self._rows]).reshape(-1, len(self._valves))
+        pv = np.array([row[1] for row in self._rows]).reshape(-1, len(self._outputs))
+        if any(row[2] for row in self._rows):
             op = np.column_stack([carried(column, between=False) for column in op.T])
             pv = np.column_stack([carried(column, between=True) for column in pv.T])
         start = (end + 1 - len(self)) * self._sample_time
