@@ -12,11 +12,10 @@ if TYPE_CHECKING:
 
 WIDE = frozenset({"Int32", "UInt32", "Int64", "UInt64", "Double"})  # they hold a beat of 31 bits
 NUMBERS = WIDE | {"SByte", "Byte", "Int16", "UInt16", "Float"}
-FITTING = {Use.REQUEST: NUMBERS | {"Boolean"}, Use.BEAT: WIDE, Use.OP: NUMBERS}
-NEEDS = {
-    Use.REQUEST: "a request is a number or Boolean",
-    Use.BEAT: "a heartbeat is a whole number of 32 bits",
-    Use.OP: "an OP is a number",
+FITTING = {  # types that a written tag may have, and what is said of another one
+    Use.REQUEST: (NUMBERS | {"Boolean"}, "a request is a number or Boolean"),
+    Use.BEAT: (WIDE, "a heartbeat is a whole number of 32 bits"),
+    Use.OP: (NUMBERS, "an OP is a number"),
 }
 QUEUE = 100  # changes of one tag that the server keeps between two publications
 
@@ -78,10 +77,12 @@ class ServerTags:
         except ua.UaError as error:
             if not is_open(self._client):
                 raise
-            return refusal(error)
-        use = self._written[tag]
-        if kind.name not in FITTING[use]:
-            return f"is of type {kind.name}, and {NEEDS[use]}"
+            told = isinstance(error, ua.UaStatusCodeError)
+            why = ua.StatusCode(error.code).name if told else "its type is not known"
+            return f"is refused ({why})"
+        fitting, needs = FITTING[self._written[tag]]
+        if kind.name not in fitting:
+            return f"is of type {kind.name}, and {needs}"
         self.kinds[tag] = kind
         return ""
 
@@ -102,11 +103,3 @@ class ServerTags:
                 self.refused[tag] = f"is refused ({handle.name})"
             else:
                 self._heard.add(tag)
-
-
-def refusal(error: Exception) -> str:
-    """Return why a tag is refused, by what OPC UA says of it."""
-    from asyncua import ua
-
-    code = ua.StatusCode(error.code).name if isinstance(error, ua.UaStatusCodeError) else ""
-    return f"is refused ({code or 'its type is not known'})"
