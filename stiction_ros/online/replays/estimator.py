@@ -61,5 +61,4 @@ def replay_estimator(
             kind = next(key for key in DOCUMENTS if key in keys)
             told[kind][int(keys["window_end"])] = read_status(keys)
     first, missed = estimator.first or 0, estimator.pairs.counts["missed"]
-    due = tuple(one for one in fits if one.end >= first)
-    return ReplayedEstimates(origin, first, estimator.samples, missed, due, told)
+    return ReplayedEstimates(origin, first, estimator.samples, missed, tuple(fits), told)
