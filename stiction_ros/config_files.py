@@ -7,14 +7,17 @@ from pathlib import Path
 from stiction_ros.errors import InputError
 
 
+def installation_prefixes() -> tuple[str, ...]:
+    """Return where ROS packages are installed: ``AMENT_PREFIX_PATH``, then Python's own prefix."""
+    listed = [part for part in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if part]
+    return tuple(dict.fromkeys([*listed, sys.prefix]))
+
+
 def config_directories() -> list[Path]:
     """Return the folders with the package's own configuration, nearest first."""
-    package = Path(__file__).resolve().parent
-    prefixes = [Path(p) for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
-    candidates = [package.parent / "config"]
-    candidates += [
-        prefix / "share" / "stiction_ros" / "config" for prefix in [*prefixes, Path(sys.prefix)]
-    ]
+    candidates = [Path(__file__).resolve().parents[1] / "config"]
+    shares = [Path(prefix) / "share" for prefix in installation_prefixes()]
+    candidates += [share / "stiction_ros" / "config" for share in shares]
     return [path for path in candidates if path.is_dir()]
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from stiction_ros.cli.shared.scenarios import STARTED, in_order, kind_of, write_parameters
-from stiction_ros.config_files import config_directories
+from stiction_ros.config_files import config_directories, installation_prefixes
 from stiction_ros.errors import InputError
 from stiction_ros.orphans import DIE_WITH_PARENT
 
@@ -142,10 +142,7 @@ def ros_environment() -> dict[str, str]:
     ``ROS_DOMAIN_ID`` and the discovery range are left alone where they are set.
     """
     environment = dict(os.environ)
-    prefixes = [p for p in environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
-    if sys.prefix not in prefixes:
-        prefixes.append(sys.prefix)
-    environment["AMENT_PREFIX_PATH"] = os.pathsep.join(prefixes)
+    environment["AMENT_PREFIX_PATH"] = os.pathsep.join(installation_prefixes())
     environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     environment.setdefault("ROS_DOMAIN_ID", str(random.SystemRandom().randint(1, 100)))
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):

@@ -2,19 +2,12 @@
 
 import functools
 import json
-import os
 import re
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from stiction_ros.config_files import installation_prefixes
 from stiction_ros.errors import InputError
-
-
-def default_prefixes() -> tuple[str, ...]:
-    """Return the installation prefixes: ``AMENT_PREFIX_PATH``, then Python's own."""
-    listed = [part for part in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if part]
-    return tuple(dict.fromkeys([*listed, sys.prefix]))
 
 
 def definition(type_name: str) -> tuple[str, str]:
@@ -25,9 +18,9 @@ def definition(type_name: str) -> tuple[str, str]:
     all that it needs.
 
     Raises:
-        InputError: no such message under :func:`default_prefixes`.
+        InputError: no such message under :func:`installation_prefixes`.
     """
-    return _definition(type_name, default_prefixes())
+    return _definition(type_name, installation_prefixes())
 
 
 @functools.lru_cache(maxsize=256)

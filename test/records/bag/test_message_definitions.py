@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 from bag_making import STORE
 
+from stiction_ros.config_files import installation_prefixes
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.message_definitions import default_prefixes, definition
+from stiction_ros.records.bag.message_definitions import definition
 
 SEPARATOR = "\n" + "=" * 80 + "\n"
 
@@ -65,6 +66,6 @@ def test_installed_messages_have_the_hash_of_their_definition(name: str) -> None
     try:
         text, type_hash = definition(name)
     except InputError:
-        pytest.skip(f"{name} is not installed under {default_prefixes()}")
+        pytest.skip(f"{name} is not installed under {installation_prefixes()}")
     assert type_hash == STORE.hash_rihs01(name)
     assert text.count("MSG: ") == STORE.generate_msgdef(name, ros_version=2)[0].count("MSG: ")
