@@ -60,14 +60,14 @@ def run(options: argparse.Namespace) -> int:
                 write_csv(record, folder / f"{name}.csv")
     told = {
         "loops": {
-            name: {"samples": w.samples, "missed": w.counts["missed"], "window": len(w), **w.counts}
+            name: {"samples": w.samples, "missed": 0, "window": len(w), **w.pairs.counts}
             for name, w in windows.items()
         },
         "cpu_seconds": time.process_time() - begin,
         "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
     total = sum(window.samples for window in windows.values())
-    missed = sum(window.counts["missed"] for window in windows.values())
+    missed = sum(window.pairs.counts["missed"] for window in windows.values())
     said = f"{len(windows)} loops, {total} samples, {missed} missed"
     hand_over(options.json, told, lambda: print(said))
     if not windows:

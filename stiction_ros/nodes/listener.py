@@ -1,7 +1,7 @@
 """One process that fills the windows of all loops in the graph, without a node for each."""
 
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -28,13 +28,14 @@ class LoopWindow:
     """The last samples of one loop, paired as the estimator pairs them.
 
     Attributes:
+        pairs: what pairs PV and OP, and counts what became of stamps.
         samples: up to now, with those that are bad or never came.
     """
 
     def __init__(self, name: str, sample_time: float, window: int) -> None:
         """Start empty; ``sample_time`` in s, ``window`` in samples."""
         self.name, self.sample_time = name, sample_time
-        self._pairs = Pairing(sample_time)
+        self.pairs = Pairing(sample_time)
         self._window: deque[PairedSample] = deque(maxlen=window)
         self._tags: dict[str, tuple[str, ...]] = {}  # as the first message of each topic has them
         self.samples = 0
@@ -44,17 +45,12 @@ class LoopWindow:
         found = picked(tags, values, self._tags.setdefault(topic, tuple(tags)))
         if found is None:
             return
-        add = self._pairs.add_pv if topic == "pv" else self._pairs.add_applied
+        add = self.pairs.add_pv if topic == "pv" else self.pairs.add_applied
         for one in add(stamp, found):
             if one.begins:
                 self._window.clear()
             self.samples += 1
             self._window.append(one)
-
-    @property
-    def counts(self) -> Counter[str]:
-        """What became of stamps, as :class:`Pairing` counts it."""
-        return self._pairs.counts
 
     def __len__(self) -> int:
         return len(self._window)

@@ -107,7 +107,7 @@ def test_samples_become_a_record() -> None:
     loop = filled(50)
     record = loop.record()
     assert record is not None
-    assert loop.counts["missed"] == 0
+    assert loop.pairs.counts["missed"] == 0
     np.testing.assert_array_equal(record.op[:, 0] - record.pv[:, 0], 30.0)
     assert record.start == 0.0
     assert len(record) == 49  # the OP of the last sample is still to come
@@ -125,7 +125,7 @@ def test_samples_that_never_came_are_counted_and_marked() -> None:
     loop = filled(60, (30, 31))
     record = loop.record()
     assert record is not None
-    assert (loop.counts["missed"], record.start) == (2, 0.0)
+    assert (loop.pairs.counts["missed"], record.start) == (2, 0.0)
     assert np.flatnonzero(record.quality == Quality.BAD).tolist() == [30, 31]
 
 

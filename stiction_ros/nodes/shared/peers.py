@@ -71,12 +71,11 @@ class Inlet:
         self.qos = qos
         self._told = 2 if informed else 1
 
-    def drain(self) -> int:
-        """Take all that is queued now, hand each message to the callback, and count them."""
-        taken = 0
-        while taken < self.qos.depth and self.take():
-            taken += 1
-        return taken
+    def drain(self) -> None:
+        """Take all that is queued now, and hand each message to the callback."""
+        for _ in range(self.qos.depth):
+            if not self.take():
+                return
 
     def take(self) -> bool:
         """Hand the oldest message that is queued to the callback; tell whether there was one."""
