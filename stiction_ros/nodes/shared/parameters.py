@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from stiction_ros.errors import InputError
-from stiction_ros.settings import Setting, check, settings_of
+from stiction_ros.settings import Setting, from_mapping, settings_of
 
 _TYPES = {
     "float": Parameter.Type.DOUBLE,
@@ -38,13 +38,10 @@ def read(node: Node, cls: type[Any]) -> Any:
     Raises:
         InputError: a value out of range, which an array's range cannot refuse by itself.
     """
-    values = {}
-    for entry in settings_of(cls):
-        value = node.get_parameter_or(entry.name).value
-        if value is None:  # an empty list in a parameter file has no type
-            value = entry.default
-        values[entry.name] = check(entry, value, node.get_name())
-    return cls(**values)
+    told = {entry.name: node.get_parameter_or(entry.name).value for entry in settings_of(cls)}
+    # An empty list in a parameter file has no type, and None for a value.
+    given = {name: value for name, value in told.items() if value is not None}
+    return from_mapping(cls, given, node.get_name())
 
 
 def refuse_unknown(node: Node) -> None:
