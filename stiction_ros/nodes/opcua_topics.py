@@ -79,7 +79,7 @@ class LoopTopics:
         """Return level, message and values of the loop's status."""
         bridge = self._bridge
         sampler, grant = bridge.sampler, bridge.grant
-        present = sampler.now(now)
+        present = sampler.clock.now(now)
         values = grant_keys(grant)
         if present is not None:
             values.append(("plant_time", f"{present / 1e9:.3f}"))

@@ -116,6 +116,7 @@ class LoopSampler:
     - A value that is not good, or of a server that is silent, is NaN.
 
     Attributes:
+        clock: the plant's time.
         counts: of readings that were ``past``, ``ahead``, ``late`` or ``bad``, samples that were
             ``skipped``, and ``new_runs``.
     """
@@ -123,7 +124,7 @@ class LoopSampler:
     def __init__(self, tags: LoopTags, speed: float = 1.0) -> None:
         """Start before the first stamp; ``speed`` in seconds of the plant per second of ours."""
         self.tags = tags
-        self._clock = PlantClock(speed)
+        self.clock = PlantClock(speed)
         self._speed = speed
         self._changes: dict[str, deque[TagReading]] = {
             tag: deque(maxlen=KEPT) for tag in tags.read_tags()
@@ -154,7 +155,7 @@ class LoopSampler:
         changes.append(reading)
         if tag not in self._pv or reading.first:
             return
-        self._clock.hear(reading.stamp, now)
+        self.clock.hear(reading.stamp, now)
         if self._next is None:
             self._next = reading.stamp
         elif self._closed is not None and reading.stamp <= self._closed + self._jitter:
@@ -164,7 +165,7 @@ class LoopSampler:
     def due(self, now: float, alive: bool) -> list[PlantSample]:
         """Return the samples that are closed by ``now``, s; ``alive``: the server is heard."""
         self._begin_without_change(now)
-        present = self._clock.now(now)
+        present = self.clock.now(now)
         found: list[PlantSample] = []
         while self._next is not None and present is not None:
             ready = alive and all(
@@ -187,14 +188,10 @@ class LoopSampler:
         """Return the newest value of a tag if it counts, else NaN."""
         return self._value(self.latest(tag), alive=True)
 
-    def now(self, now: float) -> int | None:
-        """Return the plant's time, ns, at ``now``, s on our clock; None before it is known."""
-        return self._clock.now(now)
-
     # ---- stamps ----------------------------------------------------------------------------
 
     def _is_stray(self, tag: str, reading: TagReading, last: TagReading, now: float) -> bool:
-        present = self._clock.now(now)
+        present = self.clock.now(now)
         past = reading.stamp < last.stamp
         ahead = present is not None and reading.stamp > present + FAR * self.tags.sample_ns
         if not past and not ahead:
@@ -215,7 +212,7 @@ class LoopSampler:
         for tag, changes in self._changes.items():
             kept = [dataclasses.replace(one, stamp=0) for one in list(changes)[-1:]]
             self._changes[tag] = deque(kept, maxlen=KEPT)
-        self._clock = PlantClock(self._speed)
+        self.clock = PlantClock(self._speed)
         self._next = self._closed = None
         self._strays.clear()
         self._followed = 0
@@ -230,7 +227,7 @@ class LoopSampler:
             return
         newest = max((c[-1].stamp for c in self._changes.values() if c), default=0)
         if newest:
-            self._clock.hear(newest, now)
+            self.clock.hear(newest, now)
             self._next = newest
 
     def _follow(self, stamp: int) -> None:
