@@ -143,8 +143,8 @@ class ControllerNode(ManagedNode):
     # ---- the step --------------------------------------------------------------------------
 
     def go(self) -> None:
-        """Step every sample that has all it needs, oldest first."""
-        if not self.running:
+        """Step every sample that has all it needs, oldest first; not while more is taken in."""
+        if not self.running or self._draining:
             return
         if self.settings.pace == "realtime":
             self.drain_signals()
@@ -312,7 +312,7 @@ class ControllerNode(ManagedNode):
         if not self.is_answered(stamp):
             pv = values_of(message, self.model.outputs, partly=True)
             self.port.add_pv(time.monotonic(), stamp, pv)
-        self._go()
+        self.go()
 
     def _on_sp(self, message: JointState) -> None:
         sp = values_of(message, self.model.outputs)
@@ -344,8 +344,4 @@ class ControllerNode(ManagedNode):
     def _go_in_lockstep(self) -> None:
         """Step: what came may be what a sample of an earlier PV has lacked."""
         if self.settings.pace == "lockstep":
-            self._go()
-
-    def _go(self) -> None:
-        if not self._draining:
             self.go()
