@@ -152,7 +152,7 @@ class RecorderNode(ManagedNode):
             raw=True,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
-        self._topics[name] = Inlet(subscription, (), qos, informed=True)
+        self._topics[name] = Inlet(subscription, (), qos)
 
     def _take_the_rest(self) -> None:
         """Write what waits on the subscriptions, the node's own last status among it.

@@ -48,28 +48,17 @@ class Outlet:
 
 
 class Inlet:
-    """A subscription, and the nodes whose first message must not be missed."""
+    """A subscription, and the nodes whose first message must not be missed.
+
+    The callback of a raw one is also told what the middleware knows of a message.
+    """
 
     def __init__(
-        self,
-        subscription: Subscription,
-        writers: tuple[str, ...],
-        qos: QoSProfile,
-        *,
-        informed: bool = False,
+        self, subscription: Subscription, writers: tuple[str, ...], qos: QoSProfile
     ) -> None:
-        """Note a subscription.
-
-        Args:
-            subscription: that is read.
-            writers: names of the nodes.
-            qos: asked for.
-            informed: whether the callback is also told what the middleware knows of a message.
-        """
         self.subscription = subscription
         self.writers = writers
         self.qos = qos
-        self._told = 2 if informed else 1
 
     def drain(self) -> None:
         """Take all that is queued now, and hand each message to the callback."""
@@ -85,7 +74,7 @@ class Inlet:
             )
         if found is None:
             return False
-        self.subscription.callback(*found[: self._told])
+        self.subscription.callback(*found[: 1 + self.subscription.raw])
         return True
 
 
