@@ -1,5 +1,6 @@
 """The partners of a node: who must be there before it begins, what lacks, and who has gone."""
 
+import dataclasses
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -19,6 +20,7 @@ PLANTS = ("plant", "opcua")  # nodes that publish pv: the simulated plant, the d
 WATCHER = "recorder"  # reads every topic and commands nothing
 
 
+@dataclasses.dataclass
 class Outlet:
     """A publisher that counts, and knows which nodes must hear its first message.
 
@@ -28,15 +30,12 @@ class Outlet:
     waited for again before it has received.
     """
 
-    def __init__(
-        self, publisher: Publisher, readers: tuple[str, ...], qos: QoSProfile, *, waits: bool
-    ) -> None:
-        self.publisher = publisher
-        self.readers = readers
-        self.qos = qos
-        self.waits = waits
-        self.count = 0
-        self._in_vain = False
+    publisher: Publisher
+    readers: tuple[str, ...]  # names of the nodes
+    qos: QoSProfile  # offered
+    waits: bool
+    count: int = 0
+    _in_vain: bool = False
 
     def publish(self, message: Any) -> None:
         """Publish and count."""
@@ -47,18 +46,16 @@ class Outlet:
             self._in_vain = not self.publisher.wait_for_all_acked(patience)
 
 
+@dataclasses.dataclass
 class Inlet:
     """A subscription, and the nodes whose first message must not be missed.
 
     The callback of a raw one is also told what the middleware knows of a message.
     """
 
-    def __init__(
-        self, subscription: Subscription, writers: tuple[str, ...], qos: QoSProfile
-    ) -> None:
-        self.subscription = subscription
-        self.writers = writers
-        self.qos = qos
+    subscription: Subscription
+    writers: tuple[str, ...]  # names of the nodes
+    qos: QoSProfile  # asked for
 
     def drain(self) -> None:
         """Take all that is queued now, and hand each message to the callback."""
