@@ -146,14 +146,14 @@ def run_unit(
     told = scenario.simulated.with_ideal_valves() if ideal_valves else scenario.simulated
     wiring, model = Wiring(scenario.simulated.plant, scenario.loops), told.plant
     sessions = [LoopSession(one, one.plant, identify) for one in scenario.members.values()]
-    sp, op = list[FloatArray](), list[list[FloatArray]]()
+    in_force, op = list[FloatArray](), list[list[FloatArray]]()
 
-    def controllers(measurement: Measurement, scheduled: FloatArray) -> FloatArray:
-        sp.append(wiring.set_points(scheduled))
+    def controllers(measurement: Measurement, sp: FloatArray) -> FloatArray:
+        in_force.append(wiring.set_points(sp))
         op.append([])
         for loop, session in zip(wiring.loops, sessions, strict=True):
             seen = dataclasses.replace(measurement, pv=wiring.of(loop, measurement.pv))
-            op[-1].append(session(seen, wiring.of(loop, sp[-1])))
+            op[-1].append(session(seen, wiring.of(loop, in_force[-1])))
         return wiring.take(op[-1])
 
     run, found = told.run(controllers, seed, samples, progress), {}
@@ -167,7 +167,7 @@ def run_unit(
             loop.outputs,
             np.array(given),
             wiring.of(loop, run.record.pv),
-            wiring.of(loop, np.array(sp)),
+            wiring.of(loop, np.array(in_force)),
             None if stem is None else stem[:, columns],
         )
         found[loop.name] = session.told(ClosedLoopRun(record, wiring.of(loop, run.pv_clean)))
