@@ -37,12 +37,12 @@ def identity_of(beat: float) -> int:
     return int(beat) // COUNT if 0 <= beat < IDENTITIES * COUNT else -1
 
 
+@dataclasses.dataclass
 class HeardBeat:
     """Someone's beat, and when it changed last, s; minus infinity before."""
 
-    def __init__(self) -> None:
-        self._value: float | None = None
-        self.changed_at = -np.inf
+    _value: float | None = None
+    changed_at: float = -np.inf
 
     def hear(self, value: float, now: float, first: bool) -> None:
         """Take in a beat at ``now``, s; the ``first`` report of a subscription is no change."""
