@@ -129,7 +129,7 @@ class ControllerNode(ManagedNode):
         self.live.retune(settings)
         if settings.speed != self.settings.speed:
             period = self.model.sample_time / settings.speed
-            self.port.retune(period)
+            self.port.pace.retune(period)
             if self.listening:
                 self._look_for_late(period)
 
@@ -214,7 +214,7 @@ class ControllerNode(ManagedNode):
     def _tell_changes(self) -> None:
         """Publish every change of mode since the last call."""
         for change in self.live.changes[self._told :]:
-            self.stamp = self.port.stamp_of(change.sample)
+            self.stamp = self.port.grid.stamp_of(change.sample)
             self._mode.publish(String(data=change.mode.value))
             self.log.info(f"sample {change.sample}: {change.mode}, {change.reason}")
             told = [("mode", change.mode.value), ("model", change.model), ("reason", change.reason)]
@@ -251,7 +251,7 @@ class ControllerNode(ManagedNode):
         end = self.settings.awaited(self.port.next)
         if end is None:
             return True
-        stamp = self.port.stamp_of(end)
+        stamp = self.port.grid.stamp_of(end)
         if self.fits.get(stamp, "?") in self.models:
             self._waiting_since = None
             self.fits = {s: f for s, f in self.fits.items() if s > stamp}

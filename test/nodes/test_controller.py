@@ -93,7 +93,7 @@ class Bench:
 
     def show(self, stamp: float) -> None:
         """Show a PV and spin until the node has looked at it."""
-        pace = self.node.port._pace
+        pace = self.node.port.pace
         self.send("pv", stamp, 50.0)
         self.graph.spin_until(lambda: (pace._before or (0, 0))[1] == round(stamp * S), "pv")
 

@@ -30,6 +30,7 @@ class InputPort:
     sample is answered in its turn. Nothing that arrives can stop what comes after it.
 
     Attributes:
+        grid, pace: stamps and numbers of the samples; how long a sample takes.
         counts: everything that was refused, late or missing, by reason.
         behind: samples that had to be passed over for the newest at the last look.
         waiting: PVs that came while no run could begin.
@@ -41,8 +42,8 @@ class InputPort:
         self.preview: SetPointPreview | None = None
         self.counts: Counter[str] = Counter()
         self._check = SignalCheck(rules.instruments)
-        self._grid = SampleGrid(rules.step)
-        self._pace = Pace(rules.period)
+        self.grid = SampleGrid(rules.step)
+        self.pace = Pace(rules.period)
         self._refused = Succession(standing=rules.lockstep)
         self._applied = AppliedOp(rules.step)
         self._queue: dict[int, FloatArray] = {}  # PVs by stamp; of several the last one counts
@@ -123,7 +124,7 @@ class InputPort:
             return ()
         last = next(reversed(arrived))
         self._look_at(now)
-        self._pace.show(now, last, self.rules.step)
+        self.pace.show(now, last, self.rules.step)
         if self._begun:
             samples = self._take_newest(now, arrived)
             if self._begun:
@@ -135,14 +136,14 @@ class InputPort:
         """Return samples whose PV should have come by ``now``; ask several times a sample."""
         if self.rules.lockstep or not self._begun:
             return ()
-        period = self._pace.period
+        period = self.pace.period
         self._look_at(now)
         self._looked = now
         since = now - self._blind_from
         if since < period + max(period, LATENESS) or now - self._awake < LATENESS:
             return ()
         # A PV that comes again within a period of its time is not late yet.
-        lacking = math.floor(since / period) - 1 - (self._grid.number - self._pv_number)
+        lacking = math.floor(since / period) - 1 - (self.grid.number - self._pv_number)
         if lacking <= 0:
             return ()
         skipped = max(lacking - LONGEST_GAP, 0)
@@ -154,7 +155,7 @@ class InputPort:
 
     def sent(self, now: float) -> None:
         """Note that the OP of the sample answered last has gone out."""
-        if not self.rules.lockstep and now - self._taken_at > self._pace.period:
+        if not self.rules.lockstep and now - self._taken_at > self.pace.period:
             self._in_time = False
             self.counts["late op"] += 1
 
@@ -169,23 +170,15 @@ class InputPort:
         if not self.rules.lockstep:
             self._begun, self.waiting = False, 0
 
-    def retune(self, period: float) -> None:
-        """Take samples to be ``period`` s apart by the receiver's clock."""
-        self._pace.retune(period)
-
     @property
     def next(self) -> int:
         """The number of the next sample."""
-        return self._grid.number + 1
+        return self.grid.number + 1
 
     def due(self, stamp: int) -> int:
         """Return the number of the sample at a stamp, or of the next one if that is over."""
-        grid = self._grid
+        grid = self.grid
         return self.next if self.next == 0 else max(self.next, grid.number + grid.ahead(stamp))
-
-    def stamp_of(self, number: int) -> int:
-        """Return the stamp of a sample of the present run, ns."""
-        return self._grid.stamp_of(number)
 
     def ages(self, now: float) -> dict[str, float]:
         """Return s since the last good message of each topic; what never came is left out."""
@@ -194,7 +187,7 @@ class InputPort:
     @property
     def period(self) -> float:
         """A sample, s by the receiver's clock; 0 in lockstep."""
-        return 0.0 if self.rules.lockstep else self._pace.period
+        return 0.0 if self.rules.lockstep else self.pace.period
 
     @property
     def lacks(self) -> str:
@@ -216,7 +209,7 @@ class InputPort:
 
     def _refuse_what_does_not_fit(self) -> None:
         """Refuse old stamps; far ones too, unless the samples before them are there."""
-        newer = {stamp: self._grid.ahead(stamp) for stamp in self._queue}
+        newer = {stamp: self.grid.ahead(stamp) for stamp in self._queue}
         far = min((n for n in newer.values() if n > 0), default=0) > SLACK
         for stamp, ahead in newer.items():
             if self._begun and (far or ahead <= 0):
@@ -240,7 +233,7 @@ class InputPort:
             samples = self._begin(now, stamp, pv)
         else:
             self._refused.clear()
-            samples = self._follow(now, {self._grid.ahead(stamp): (stamp, pv)})
+            samples = self._follow(now, {self.grid.ahead(stamp): (stamp, pv)})
         for waiting in (self._sp_at, self._dv_at):
             for old in [at for at in waiting if at <= stamp]:
                 del waiting[old]
@@ -250,7 +243,7 @@ class InputPort:
 
     def _look_at(self, now: float) -> None:
         """Note when the receiver itself stood still: what came is only now on its way."""
-        patience = max(self._pace.period, LATENESS)
+        patience = max(self.pace.period, LATENESS)
         if self._looked is not None and now - self._looked > patience:
             self._looked = self._awake = now
             self._before = self._pv_number, self._pv_now
@@ -260,24 +253,24 @@ class InputPort:
         number, heard = self._pv_number, self._pv_now
         if now - self._awake < AWAKE:
             number, heard = self._before
-        since = max(now - heard, 0.0) / self._pace.period
-        latest = number - self._grid.number + SLACK + 2.0 * since
+        since = max(now - heard, 0.0) / self.pace.period
+        latest = number - self.grid.number + SLACK + 2.0 * since
         fitting: dict[int, tuple[int, FloatArray]] = {}
         for stamp, pv in sorted(arrived.items(), key=lambda one: one[0]):
-            ahead = self._grid.ahead(stamp)
+            ahead = self.grid.ahead(stamp)
             if ahead > max(latest, max(fitting, default=0) + SLACK):
                 self.counts["ahead"] += 1
             elif ahead > 0:
                 fitting.setdefault(ahead, (stamp, pv))
             else:
-                late = self._missed.pop(self._grid.number + ahead, False)
+                late = self._missed.pop(self.grid.number + ahead, False)
                 self.counts["late" if late else "stale"] += 1
         if not fitting:
             for stamp in arrived:
                 follows = self._refused.last is None or (
                     stamp - self._refused.last <= (SLACK + 2.0 * since) * self.rules.step
                 )
-                if self._refused.add(stamp, follows or stamp < self._grid.stamp):
+                if self._refused.add(stamp, follows or stamp < self.grid.stamp):
                     self._end_run()
                     break
             return ()
@@ -301,7 +294,7 @@ class InputPort:
         self._begun, self.waiting, self.behind = True, 0, 0
         self._refused.clear()
         self._check.forget()
-        self._grid.begin(stamp)
+        self.grid.begin(stamp)
         self._applied.before(stamp, True)
         self._heard(now)
         return (self._sample(pv, stamp, True, Given(in_force), begins=True),)
@@ -324,15 +317,15 @@ class InputPort:
                 samples.append(self._missing(False))
                 continue
             stamp, pv = fitting[k]
-            self._grid.advance(stamp)
+            self.grid.advance(stamp)
             samples.append(self._sample(pv, stamp, k == newest, self._given(stamp)))
         self._heard(now)
         return tuple(samples)
 
     def _missing(self, answered: bool) -> Sample:
-        self._grid.advance(None)
-        stamp = self._grid.stamp
-        keep(self._missed, self._grid.number, True, KEPT)
+        self.grid.advance(None)
+        stamp = self.grid.stamp
+        keep(self._missed, self.grid.number, True, KEPT)
         return self._sample(None, stamp, answered, self._given(stamp))
 
     def _given(self, stamp: int) -> Given:
@@ -341,7 +334,7 @@ class InputPort:
 
     def _heard(self, now: float) -> None:
         """Note when the newest PV came."""
-        self._pv_number, self._pv_now = self._grid.number, now
+        self._pv_number, self._pv_now = self.grid.number, now
         self._blind_from = self._taken_at = now
 
     def _sample(
@@ -358,4 +351,4 @@ class InputPort:
         sp, dv = self._sp, self._dv
         if self.rules.lockstep:
             sp, dv = self._sp_at.get(stamp, sp), self._dv_at.get(stamp)
-        return Sample(self._grid.number, stamp, seen, sp, dv, answered, begins, given)
+        return Sample(self.grid.number, stamp, seen, sp, dv, answered, begins, given)
