@@ -120,6 +120,7 @@ class PlantLink:
         """Prepare; :meth:`start` connects. ``written`` says what each tag is written for."""
         self.settings = settings
         self._tags = (read, written)
+        self._sampling = 500.0 * settings.publishing  # ms between two looks of the server at a tag
         self._wake = wake or (lambda: None)
         self._events: deque[LinkEvent] = deque()
         self._heard_at = float("-inf")
@@ -237,11 +238,6 @@ class PlantLink:
             if tags.refused != before:
                 self._tell(Refused(tags.refused))
 
-    @property
-    def _sampling(self) -> float:
-        """How often the server looks at a tag, ms."""
-        return 500.0 * self.settings.publishing
-
     async def _subscribe(self, client: "Client") -> Any:
         from asyncua import ua
 
@@ -266,7 +262,7 @@ class PlantLink:
             if not isinstance(event, DataChangeEvent):
                 return "the server ended the subscription"
             value = event.data.monitored_item.Value
-            for tag in tags.of(event.node.nodeid):
+            for tag in tags.names.get(event.node.nodeid, []):
                 self._events.append(Heard(tag, reading_of(value, tag not in seen), now))
                 seen.add(tag)
             self._wake()

@@ -24,6 +24,7 @@ class ServerTags:
     """Tags as a server knows them. One that it refuses leaves the others as they are.
 
     Attributes:
+        names: of the tags that are read from a node.
         nodes: of the tags that are node ids of a namespace that is there.
         kinds: type of number that a written tag takes; without those that are refused.
         refused: why a tag is refused, for those that are.
@@ -33,15 +34,11 @@ class ServerTags:
         """Take the tags; :meth:`ask` asks the server."""
         self._client, self._read, self._written = client, read, written
         self._heard: set[str] = set()  # tags that are subscribed to
-        self._names: dict[ua.NodeId, list[str]] = {}
+        self.names: dict[ua.NodeId, list[str]] = {}
         self._writers: dict[ua.NodeId, str] = {}  # the first tag of each written node
         self.nodes: dict[str, ua.NodeId] = {}
         self.kinds: dict[str, ua.VariantType] = {}
         self.refused = dict.fromkeys((*read, *written), "is not known yet")
-
-    def of(self, node: "ua.NodeId") -> list[str]:
-        """Return the tags that are read from a node."""
-        return self._names.get(node, [])
 
     async def ask(self, subscription: Any, interval: float) -> None:
         """Ask for all that is refused: nodes, types of what is written, changes of what is read.
@@ -92,7 +89,7 @@ class ServerTags:
         if not tags:
             return
         for tag in tags:
-            names = self._names.setdefault(self.nodes[tag], [])
+            names = self.names.setdefault(self.nodes[tag], [])
             names += [tag] if tag not in names else []
         nodes = [self._client.get_node(self.nodes[tag]) for tag in tags]
         found = await subscription.subscribe_data_change(
