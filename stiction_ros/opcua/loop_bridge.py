@@ -236,16 +236,14 @@ class LoopBridge:
 
     def limits(self) -> OpLimits | None:
         """Return the limits in force; None when one that the plant sets is not known."""
-        low, high = [], []
-        for valve in self.tags.valves:
-            lows = [self.sampler.number(valve.low)] if valve.low else []
-            highs = [self.sampler.number(valve.high)] if valve.high else []
-            if not np.isfinite([*lows, *highs]).all():
-                return None
-            low.append(max(valve.limits[0], *lows, valve.limits[0]))
-            high.append(min(valve.limits[1], *highs, valve.limits[1]))
-        rate = [valve.rate for valve in self.tags.valves]
-        return OpLimits(np.array(low), np.array(high), np.array(rate))
+        valves, number = self.tags.valves, self.sampler.number
+        given = np.array([v.limits for v in valves])
+        low = [number(v.low) if v.low else -np.inf for v in valves]
+        high = [number(v.high) if v.high else np.inf for v in valves]
+        if np.isnan([low, high]).any():
+            return None
+        rate = np.array([v.rate for v in valves])
+        return OpLimits(np.maximum(given[:, 0], low), np.minimum(given[:, 1], high), rate)
 
     def _request(self, now: float) -> list[WriteOrder]:
         told = self.tags.grant
