@@ -185,21 +185,18 @@ class PlantLink:
         """Hold one session for as long as it lasts; return why it ended."""
         from asyncua import ua
 
+        client = None
         try:
             client = await open_client(self.settings.url, self.settings)
-        except (OSError, TimeoutError, InputError, ua.UaError) as error:
-            return describe(error)
-        except Exception as error:  # of the certificates' library, whose errors share no base
-            return f"no session could be opened: {type(error).__name__}"
-        try:
             return await self._session(client)
         except (OSError, TimeoutError, InputError, ua.UaError) as error:
             return describe(error)
-        except Exception as error:  # whatever a server sends, it must not end the bridge
+        except Exception as error:  # whatever server or certificate brings must not end the bridge
             return f"the session failed: {type(error).__name__}"
         finally:
-            with contextlib.suppress(OSError, TimeoutError, ua.UaError):
-                await asyncio.wait_for(client.disconnect(), ANSWER)
+            if client is not None:
+                with contextlib.suppress(OSError, TimeoutError, ua.UaError):
+                    await asyncio.wait_for(client.disconnect(), ANSWER)
 
     async def _session(self, client: "Client") -> str:
         tags = ServerTags(client, *self._tags)
