@@ -13,7 +13,6 @@ from scipy.linalg import solveh_banded
 
 from stiction_ros.discrepancy.data.scans import between_samples
 from stiction_ros.discrepancy.measures import (
-    GAUSS_NEWTON,
     MAJORITY,
     NEARLY_ALL,
     NORMAL_OF_MEDIAN,
@@ -136,6 +135,22 @@ class _Part:
         return np.asarray(solveh_banded(bands, wanted))
 
 
+def _of_least_sizes(columns: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return the factors of columns, shape (2,), that leave the least sum of sizes, by HiGHS."""
+    from scipy.optimize import linprog
+    from scipy.sparse import eye, hstack
+
+    count, factors = columns.shape
+    each = eye(count)
+    found = linprog(
+        np.concatenate([np.zeros(factors), np.ones(2 * count)]),
+        A_eq=hstack([columns, each, -each]),
+        b_eq=wanted,
+        bounds=[*[(None, None)] * factors, *[(0.0, None)] * (2 * count)],
+    )
+    return np.asarray(found.x[:factors])
+
+
 def _law(
     parts: list[_Part], tuning: PiTuning | None, interval: float
 ) -> tuple[float, float, float] | None:
@@ -150,11 +165,7 @@ def _law(
         return None  # where OP rests more often, somebody moves it
     nothing = ROUNDING * float(np.abs(wanted).max())
     if tuning is None:
-        law, weights = np.zeros(2), np.ones(len(wanted))
-        for _ in range(GAUSS_NEWTON):
-            law[:] = np.linalg.lstsq(columns * weights[:, None], wanted * weights, rcond=None)[0]
-            left = np.abs(wanted - columns @ law)
-            weights = 1.0 / np.sqrt(np.maximum(left, nothing))
+        law = _of_least_sizes(columns, wanted)
     else:
         law = tuning.gain * np.array([1.0, interval / tuning.integral_time])
     gain, integral = law.tolist()
