@@ -24,7 +24,7 @@ from stiction_ros.discrepancy.measures import (
     PROBE,
     ROUNDING,
 )
-from stiction_ros.discrepancy.process.slower import GAIN, Changeable, with_equation
+from stiction_ros.discrepancy.simulation.equation import GAIN, Changeable, with_equation
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
 from stiction_ros.effects.behaviour import BoolArray

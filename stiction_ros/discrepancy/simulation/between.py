@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from stiction_ros.deferred import lfilter
-from stiction_ros.discrepancy.process.slower import lagged_process
+from stiction_ros.discrepancy.simulation.equation import lagged_process
 from stiction_ros.discrepancy.simulation.responses import responses_of
 from stiction_ros.effects import Behaviour, FloatArray, Lag
 from stiction_ros.loop import LoopModel

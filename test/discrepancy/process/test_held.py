@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
-from stiction_ros.discrepancy.process.slower import Changeable, held, later, slower, zeros_of
+from stiction_ros.discrepancy.simulation.equation import Changeable, held, later, slower, zeros_of
 from stiction_ros.effects import FloatArray
 from stiction_ros.processes import ArxOutput
 
