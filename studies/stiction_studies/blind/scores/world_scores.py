@@ -155,20 +155,16 @@ def _changes(loop: HiddenLoop, answer: Mapping[str, Any]) -> frozenset[Name]:
 
 
 def _changed(loop: HiddenLoop, effect: Effect, answer: Mapping[str, Any]) -> bool:
-    """Whether another gain or dead time of the process is told as such, within a factor of two.
-
-    Where the model is off as well, the figure that is told is that of both together.
-    """
-    plant, known = loop.base.plant, loop.known
+    """Whether a gain or dead time is told as a change of the process, within a factor of two."""
+    plant, known = loop.base.plant, loop.known  # what the model is off by counts as well
     told = {change["what"]: float(change["value"]) for change in answer["process_changes"]}
-    ratio = 0.0
     if effect.key == (PROCESS, "delay"):
         late = effect.figures["extra"] * loop.record.sample_time + plant.dead_time - known.dead_time
-        ratio = told.get("delay", 0.0) / late
-    elif effect.key == (PROCESS, "gain"):
+        return 0.5 < told.get("delay", 0.0) / late < 2.0
+    if effect.key == (PROCESS, "gain"):
         other = math.log(effect.figures["factor"] * plant.gain / known.gain)
-        ratio = math.log(told.get("gain", 1.0)) / other
-    return 0.5 < ratio < 2.0
+        return 0.5 < math.log(told.get("gain", 1.0)) / other < 2.0
+    return False
 
 
 def _is_right(claim: Claim, own: frozenset[Name], alike: frozenset[Name]) -> bool:
