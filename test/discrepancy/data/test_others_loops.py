@@ -224,14 +224,17 @@ def test_a_curve_is_judged_with_the_changed_process_left_open() -> None:
 
 @pytest.mark.trial
 def test_a_lag_is_stepped_with_the_process_that_stands_in_for_it() -> None:
-    (found,) = answered(352, given="off").effects
+    found, *others = answered(352, given="off").effects
     assert ("sensor:PV1", "lag") in {(found.place, found.effect), *found.alternatives}
     assert found.closed > 0.9
+    assert {each.effect for each in others} <= {"gain"}  # which the model is off by
 
 
 @pytest.mark.trial
-def test_a_dead_time_far_beyond_an_error_of_the_model_is_an_effect() -> None:
-    assert names(answered(320, given="off")) == [("process:PV1", "delay")]
+def test_a_dead_time_far_beyond_an_error_of_the_model_is_told() -> None:
+    answer = answered(320, given="off")
+    late = [each for each in answer.process_changes if each.what == "delay"]
+    assert late or names(answer) == [("process:PV1", "delay")]
 
 
 @pytest.mark.trial
