@@ -60,7 +60,7 @@ def record(samples: int = 1200) -> Record:
 def identification(of: Record) -> Identification:
     """Return what identification might say of such a record."""
     valve = ValveEstimate(
-        "V1", VerdictKind.STICKY, "he", 2.0, (1.8, 2.2), 1.0, (0.9, 1.1), 1.0, 50.0, 40, {}, (), 0.5
+        "V1", VerdictKind.STICKY, "he", 2.0, (1.8, 2.2), 1.0, (0.9, 1.1), 1.0, 50.0, 40, {}, 0.5
     )
     cause = Cause(CauseKind.VALVE, 60.0, 3.0, 1.0, "Without the friction nothing moves.")
     output = OutputModel("PV1", (-0.8,), {"V1": (0.2,)}, {"V1": 1}, 0.0, 0.1, 90.0, 80.0, cause)

@@ -157,7 +157,7 @@ def _changes(loop: HiddenLoop, answer: Mapping[str, Any]) -> frozenset[Name]:
 def _changed(loop: HiddenLoop, effect: Effect, answer: Mapping[str, Any]) -> bool:
     """Whether a gain or dead time is told as a change of the process, within a factor of two."""
     plant, known = loop.base.plant, loop.known  # what the model is off by counts as well
-    told = {change["what"]: float(change["value"]) for change in answer["process_changes"]}
+    told = {change["what"]: float(change["value"]) for change in answer.get("process_changes", ())}
     if effect.key == (PROCESS, "delay"):
         late = effect.figures["extra"] * loop.record.sample_time + plant.dead_time - known.dead_time
         return 0.5 < told.get("delay", 0.0) / late < 2.0

@@ -40,7 +40,7 @@ def test_a_dead_time_is_exact_between_samples(
 ) -> None:
     late = fraction + more
     assume(abs(late - round(late)) > 1e-4)  # a whole sample more, or all of one: the same
-    plant = held(*lag(gain, time, fraction))
+    plant = held(*map(tuple, lag(gain, time, fraction)))
     assert plant is not None
     assert plant.fraction == pytest.approx(fraction, abs=1e-5)
     moved, whole = later(plant, more)
@@ -51,7 +51,7 @@ def test_a_dead_time_is_exact_between_samples(
 
 def test_time_constants_and_leads_are_changed_each_by_itself() -> None:
     a, b = sampled([-3.0], [12.0, 5.0], 0.7)
-    plant = held(a, b)
+    plant = held(tuple(a), tuple(b))
     assert plant is not None
     stretches = np.where(np.abs(1.0 / plant.poles.real) > 8.0, 1.1, 0.9)
     found = slower(plant, stretches, np.full(len(zeros_of(plant)), 1.2))
@@ -60,9 +60,9 @@ def test_time_constants_and_leads_are_changed_each_by_itself() -> None:
 
 
 def test_what_is_no_held_plant_is_none() -> None:
-    assert held(np.array([1.0, 0.5]), np.array([1.0])) is None  # alternates
-    assert held(np.array([1.0, -0.5, 0.0]), np.array([1.0])) is None  # dead time as a pole
-    assert held(np.array([1.0, -0.5]), np.array([1.0, 1.0, 1.0])) is None
+    assert held((1.0, 0.5), (1.0,)) is None  # alternates
+    assert held((1.0, -0.5, 0.0), (1.0,)) is None  # dead time as a pole
+    assert held((1.0, -0.5), (1.0, 1.0, 1.0)) is None
 
 
 def equation(a: FloatArray, b: FloatArray, delay: int) -> ArxOutput:
