@@ -11,6 +11,7 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.measures import NEGLIGIBLE, TRIED
 from stiction_ros.discrepancy.process.change import changed_process
+from stiction_ros.discrepancy.simulation.equation import GAIN
 from stiction_ros.discrepancy.steps.state import State, Task
 
 
@@ -57,28 +58,30 @@ def _best(task: Task, found: Sequence[Explanation | None]) -> Explanation | None
 def same_thing(changes: Sequence[ProcessChange], effects: Sequence[str]) -> bool:
     """Tell whether a changed process is one effect of the process by another name.
 
-    A model that is a little off is so in several figures; one alone is what an effect says.
+    A model that is a little off is so in several figures; one alone is what an effect says. Of
+    another gain the looks have judged already, beside a curve of the valve.
     """
     whats = {change.what for change in changes}
-    return len(whats) == 1 and whats <= set(effects)
+    return whats == {GAIN} or (len(whats) == 1 and whats <= set(effects))
 
 
 def mended(task: Task, state: State) -> State | None:
     """Return the state behind another process, where that, beside fewer effects, explains more.
 
     A model that was fitted to another record is never exact: what its errors leave looks
-    like effects. Effects that have a name give way to it by the margin only. Behind the process
-    all effects, one or none of them are tried, and where there are none, those that explain most
-    alone.
+    like effects. Effects that have a name give way to it by the margin only, those that explain
+    most alone where it explains more beside them. Behind the process all effects, one or none of
+    them are tried.
     """
     if not suspicious(state.now.base):
         return None
     margin, added = task.options.margin, state.now.effects
-    parts = [(), *((each,) for each in added or singles(state)[:TRIED])]
+    alone = [] if added else singles(state)[:TRIED]
+    parts = [(), *((each,) for each in added or alone)]
     parts += [added] if len(added) > 1 else []
     found = _best(task, [with_process(task, state, part) for part in parts])
-    due = margin if added else 0.0
-    if found is None or found.worth(margin) >= state.now.worth(margin) - due:
+    due = margin if added else max((e.fit.evidence - margin for e in alone), default=0.0)
+    if found is None or found.worth(margin) >= state.now.worth(margin) - max(due, 0.0):
         return None
     names = [each.effect for each in added] or _left_in_doubt(state)
     if same_thing(found.changes, names):
@@ -106,6 +109,8 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
     inside = [fit for fit in scores.fits if fit.candidate.inside and fit.evidence > 0.0]
     gained = max((fit.evidence for fit in inside), default=0.0)
     explained = state.now.worth(margin) - found.worth(margin)
+    if state.now.effects:  # as of each further effect
+        explained -= NEGLIGIBLE * max(state.now.holding(()).score - state.now.score, 0.0)
     near = min(gained, explained - margin)
     rivals = [fit.candidate.effect for fit in inside if fit.evidence >= near]
     if explained <= gained or same_thing(found.changes, rivals):
