@@ -70,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _print(read: str, found: "LinearIdentification") -> None:
-    """Print what was ``read``, and what was found."""
+    """Print what was read of the record, then the model that was found."""
     print(read)
     console = Console()
     title = f"state space, {found.samples} samples, {found.status}"

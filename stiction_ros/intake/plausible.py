@@ -13,7 +13,7 @@ from stiction_ros.intake.intake_options import TO_PERCENT, OpUnit, known_op_unit
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.tables.block import Block, Column
 from stiction_ros.intake.words import WORDS
-from stiction_ros.signals.tracking import explained, is_nearer
+from stiction_ros.signals.tracking import FEWEST, explained, is_nearer
 
 PERCENT = (-10.0, 110.0)  # what an OP in % stays within
 OFTEN = 0.1  # share of the samples outside of that from which it is told
@@ -33,7 +33,6 @@ SAID = {unit: WORDS["op_ranges"][unit][2] for unit in TO_PERCENT}  # units as no
 SEVERAL = frozenset(WORDS["several"])  # units of OP of which several ranges are usual
 OWN = "its own unit"  # what stands for the unit of an OP that is not known to be in %
 EXAMINED = 20_000  # samples that are looked at
-FEWEST = 50  # samples from which anything is told of a swap
 
 
 def in_percent(block: Block, given: OpUnit | None, *, named: bool) -> tuple[Block, str, str]:

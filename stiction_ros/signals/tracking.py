@@ -5,6 +5,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 
 CLOSER = 0.1  # distance of a column from SP over that of another from which it is the nearer one
+FEWEST = 50  # samples from which a swap of OP and PV is told
 OFFSET = 0.3  # lasting offset, as a share of the standard deviation of the error
 TRACKED = 0.7  # error, as a share of the standard deviation of a moving SP
 

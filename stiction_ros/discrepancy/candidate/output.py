@@ -16,7 +16,8 @@ from stiction_ros.discrepancy.candidate.base import (
     lag_axis,
 )
 from stiction_ros.discrepancy.measures import LONGEST_DELAY, QUARTER, SLIGHT
-from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.discrepancy.simulation.responses import end_to_end
 from stiction_ros.effects import (
     Axis,
     Behaviour,

@@ -9,7 +9,8 @@ from stiction_ros.discrepancy.candidate.base import Candidate, KindCandidate, Re
 from stiction_ros.discrepancy.candidate.output import OutputCandidate
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.candidate.wave import surprises
-from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, seen_of
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, seen_of
+from stiction_ros.discrepancy.simulation.responses import end_to_end
 from stiction_ros.effects import Axis, Behaviour, FloatArray, Seen, behaviours
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.errors import InputError

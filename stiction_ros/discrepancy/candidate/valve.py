@@ -15,7 +15,8 @@ from stiction_ros.discrepancy.candidate.base import (
     lag_axis,
 )
 from stiction_ros.discrepancy.measures import ALONG, NEGLIGIBLE, QUARTER, ROUNDING, SLIGHT
-from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, over_samples
+from stiction_ros.discrepancy.simulation.responses import end_to_end
 from stiction_ros.effects import (
     Axis,
     Backlash,

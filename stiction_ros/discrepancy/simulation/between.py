@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from stiction_ros.deferred import lfilter
-from stiction_ros.discrepancy.simulation.equation import lagged_process
-from stiction_ros.discrepancy.simulation.responses import responses_of
+from stiction_ros.discrepancy.simulation.equation import Changeable, with_equation
+from stiction_ros.discrepancy.simulation.responses import end_to_end, responses_of
 from stiction_ros.effects import Behaviour, FloatArray, Lag
 from stiction_ros.loop import LoopModel
-from stiction_ros.processes import AlteredProcess
+from stiction_ros.processes import AlteredProcess, ArxProcess
 
 if TYPE_CHECKING:
     from stiction_ros.discrepancy.simulation.free_run import FreeRun
@@ -63,8 +63,13 @@ def beyond_samples(
         valve: index of the slow valve; None for the process and the sensor, which slow all.
     """
     step, name = run.runs.sample_time, None if valve is None else run.model.valve_names[valve]
-    found = [lagged_process(run.model.process, output, tau, step, name) for tau in lags.tolist()]
-    plants = [responses_of(each, step) for each in found if each is not None]
+    plants, process = [], run.model.process
+    inner = process.inner if isinstance(process, AlteredProcess) else process
+    if isinstance(inner, ArxProcess):
+        equation = Changeable(inner.equations[output])
+        slower = [equation.lagged(lag / step, name) for lag in lags.tolist()]
+        processes = [with_equation(process, output, own, step) for own in slower if own is not None]
+        plants = [responses_of(each, step) for each in processes]
     parts = []
     for rows in run.runs.slices:
         inputs, values = run.inputs(rows), run.forced[rows, output]
@@ -77,7 +82,7 @@ def beyond_samples(
             parts.append(exact - on_samples)
         else:
             parts.append(-0.5 * np.diff(on_samples, axis=0, prepend=on_samples[:1]))
-    return parts[0] if len(parts) == 1 else np.vstack(parts)
+    return end_to_end(parts)
 
 
 def _of(run: "FreeRun", output: int, lag: Lag, valve: int | None = None) -> FloatArray:
@@ -85,7 +90,7 @@ def _of(run: "FreeRun", output: int, lag: Lag, valve: int | None = None) -> Floa
 
 
 def _ahead(run: "FreeRun", lag: Lag, values: FloatArray) -> FloatArray:
-    """Return values of which a lag on the samples makes those given: they have passed it once."""
+    """Return what entered a lag on the samples, by the values that left it."""
     keep = math.exp(-run.runs.sample_time / lag.time_constant)
     return np.asarray(lfilter([1.0, -keep], [1.0 - keep], values, axis=0))
 

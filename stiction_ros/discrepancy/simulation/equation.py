@@ -1,4 +1,4 @@
-"""What of an equation may be a few per cent off: gain, time constants, leads, dead time."""
+"""An equation with another gain, time constant, lead or dead time, or with one more lag."""
 
 import dataclasses
 import functools
@@ -13,9 +13,8 @@ from stiction_ros.effects import FloatArray
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, Process
 from stiction_ros.processes.sampled import pulses
 
-EXACT = (
-    EPSILON**0.5
-)  # of b, that the continuous plant may miss, and of a numerator: half the digits
+EXACT = EPSILON**0.5
+"""Half of all digits: the share of b that a plant may miss, and what counts as 0 in a numerator."""
 
 ComplexArray = NDArray[np.complex128]
 
@@ -259,22 +258,3 @@ def with_equation(process: Process, output: int, own: ArxOutput, sample_time: fl
     assert isinstance(process, ArxProcess)
     equations = (*process.equations[:output], own, *process.equations[output + 1 :])
     return ArxProcess(equations, process.valves, process.model.stem0, process.model.pv0)
-
-
-def lagged_process(
-    process: Process, output: int, lag: float, sample_time: float, valve: str | None = None
-) -> Process | None:
-    """Return a process with one more lag, that goes on between samples; None without a plant.
-
-    Args:
-        process: as it is.
-        output: index of the output that is slower.
-        lag: time constant, s.
-        sample_time: s.
-        valve: the valve that is slow; None for the process and the sensor.
-    """
-    inner = process.inner if isinstance(process, AlteredProcess) else process
-    if not isinstance(inner, ArxProcess):
-        return None
-    own = Changeable(inner.equations[output]).lagged(lag / sample_time, valve)
-    return None if own is None else with_equation(process, output, own, sample_time)

@@ -12,7 +12,7 @@ from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, Blocks
 from stiction_ros.discrepancy.measures import PROBE
 from stiction_ros.discrepancy.simulation.between import left_open
-from stiction_ros.discrepancy.simulation.responses import Responses, responses_of
+from stiction_ros.discrepancy.simulation.responses import Responses, end_to_end, responses_of
 from stiction_ros.effects import Behaviour, FloatArray, Seen
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.effects.disturbance.periodic import PeriodicDisturbance
@@ -168,11 +168,6 @@ def _check(model: LoopModel, record: Record) -> None:
             where=record.name,
             fix="fit a model to this sample time",
         )
-
-
-def end_to_end(parts: Sequence[FloatArray]) -> FloatArray:
-    """Return the parts of every record below each other; one alone is not copied."""
-    return parts[0] if len(parts) == 1 else np.vstack(parts)
 
 
 class FreeRun:

@@ -1,6 +1,7 @@
 """Responses of a process to stem positions, for many stems at once."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -67,6 +68,11 @@ def tank_states(
             states[k, g] = state[g]
             state[g] = (1.0 + z * tail) * state[g] + source
     return states
+
+
+def end_to_end(parts: Sequence[FloatArray]) -> FloatArray:
+    """Return the parts of every record below each other; one alone is not copied."""
+    return parts[0] if len(parts) == 1 else np.vstack(parts)
 
 
 class Responses(ABC):

@@ -18,18 +18,25 @@ from stiction_ros.discrepancy.steps.state import State, Task
 def best_whole(now: Explanation, margin: float) -> Explanation:
     """Return the best of all subsets of what was found, one effect after the other.
 
-    Every further effect has to gain the margin, beside a share of what all gain: no plant obeys a
-    law to the letter, and what the law misses weighs the more the more it explains.
+    Every further effect has to gain the margin, beside a share of what all gain.
     """
     added = now.effects
     if not added:
         return now
     tried, price = [now, now.holding(())], margin
     if len(added) > 1:
-        price += NEGLIGIBLE * max(tried[1].score - tried[0].score, 0.0)
+        price += share_of_all(now, tried[1])
         for count in range(1, len(added)):
             tried += [now.refitted(part) for part in itertools.combinations(added, count)]
     return min(tried, key=lambda each: each.worth(price))
+
+
+def share_of_all(whole: Explanation, bare: Explanation) -> float:
+    """Return what one more effect has to gain of all that a whole gains over one without effects.
+
+    No plant obeys a law to the letter: what the law misses weighs the more the more it explains.
+    """
+    return NEGLIGIBLE * max(bare.score - whole.score, 0.0)
 
 
 def suspicious(base: Baseline) -> bool:
@@ -69,9 +76,9 @@ def mended(task: Task, state: State) -> State | None:
     """Return the state behind another process, where that, beside fewer effects, explains more.
 
     A model that was fitted to another record is never exact: what its errors leave looks
-    like effects. Effects that have a name give way to it by the margin only, those that explain
-    most alone where it explains more beside them. Behind the process all effects, one or none of
-    them are tried.
+    like effects. Effects that have a name give way to another process by the margin only. Where
+    none has a name, another process beside an effect has to explain more than the effect that
+    explains most alone. Behind the process all effects, one or none of them are tried.
     """
     if not suspicious(state.now.base):
         return None
@@ -80,8 +87,8 @@ def mended(task: Task, state: State) -> State | None:
     parts = [(), *((each,) for each in added or alone)]
     parts += [added] if len(added) > 1 else []
     found = _best(task, [with_process(task, state, part) for part in parts])
-    due = margin if added else max((e.fit.evidence - margin for e in alone), default=0.0)
-    if found is None or found.worth(margin) >= state.now.worth(margin) - max(due, 0.0):
+    due = margin if added else max([0.0, *(each.fit.evidence - margin for each in alone)])
+    if found is None or found.worth(margin) >= state.now.worth(margin) - due:
         return None
     names = [each.effect for each in added] or _left_in_doubt(state)
     if same_thing(found.changes, names):
@@ -110,7 +117,7 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
     gained = max((fit.evidence for fit in inside), default=0.0)
     explained = state.now.worth(margin) - found.worth(margin)
     if state.now.effects:  # as of each further effect
-        explained -= NEGLIGIBLE * max(state.now.holding(()).score - state.now.score, 0.0)
+        explained -= share_of_all(state.now, state.now.holding(()))
     near = min(gained, explained - margin)
     rivals = [fit.candidate.effect for fit in inside if fit.evidence >= near]
     if explained <= gained or same_thing(found.changes, rivals):

@@ -5,10 +5,9 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.record import Quality, Record
-from stiction_ros.signals.tracking import explained, is_nearer
+from stiction_ros.signals.tracking import FEWEST, explained, is_nearer
 
 TOO_SHORT = "take a longer record, lower orders or a narrower delay range"
-FEWEST = 50  # samples from which a swap is told
 EXACT = 1e-6  # share of a controller's moves that its own law leaves, at most
 
 
