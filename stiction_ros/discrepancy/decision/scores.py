@@ -118,7 +118,7 @@ def _expected(base: Baseline, candidate: Candidate) -> float:
     point = reference_point(base, candidate)
     response = candidate.respond(base.run, point)
     energy = 0.0
-    rows = 2
+    rows = 2.0
     for i in response.outputs:
         noise, blocks = base.noise[i], base.blocks[i]
         wave = np.zeros(len(base.run.runs))

@@ -95,7 +95,8 @@ def misfit(
         else:
             assert sizes is not None
             squares = target @ target - taken_by_sizes(target, sizes, marked, basis, ar[i])
-        total = total + len(rows) * np.log(np.maximum(squares, TINY))
+        count = base.blocks[i].measured * len(rows)
+        total = total + count * np.log(np.maximum(squares, TINY))
     if response.possible is not None:
         total = np.where(response.possible, total, np.inf)
     return np.asarray(total)
@@ -120,7 +121,7 @@ def settled(
             scores.append(misfit(base, gap, response, ar))
         kept = np.isfinite(scores).all(axis=0)  # elsewhere a side is no figure of the effect
         scores = [np.where(kept, score, 0.0) for score in scores]
-        rows = sum(int(base.blocks[i].train.sum()) for i in response.outputs)
+        rows = sum(base.noise[i].rows for i in response.outputs)
         low, middle, high = np.exp((np.array(scores) - np.min(scores, axis=0)) / max(rows, 1))
         bend = np.maximum(low - 2.0 * middle + high, TINY)
         vertex = np.clip(0.5 * PROBE * (low - high), -bend, bend) / bend

@@ -104,7 +104,7 @@ def _dated(search: "_Search") -> CandidateFit:
     samples of two blocks on either side.
     """
     base, found = search.base, search.best()
-    every = tuple(Blocks(b.scored, np.zeros_like(b.held)) for b in base.blocks)
+    every = tuple(Blocks(b.scored, np.zeros_like(b.held), b.measured) for b in base.blocks)
     whole = _Search(dataclasses.replace(base, blocks=every), search.gap, search.candidate)
     axis, runs = search.candidate.axes[0], base.run.runs
     near = np.abs(runs.time - found.point[0]) <= 2 * runs.block * runs.sample_time

@@ -191,7 +191,7 @@ def _linear_ends(base: Baseline, fit: CandidateFit) -> list[FloatArray]:
     """Return the ends of every linear figure, all others held, from its parabola of squares."""
     ends: list[FloatArray] = []
     ar = {i: noise.ar for i, noise in fit.noise.items()}
-    rows = sum(int(base.blocks[i].train.sum()) for i in fit.noise)
+    rows = sum(noise.rows for noise in fit.noise.values())
     for d, axis in enumerate(fit.candidate.axes):
         if not axis.linear:
             continue

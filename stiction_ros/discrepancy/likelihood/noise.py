@@ -42,6 +42,8 @@ class Blocks:
 
     train: BoolArray  # train, held: rows, shape (N,); a row is in at most one of them
     held: BoolArray
+    # share of the values that were measured: those between values that a historian kept say nothing
+    measured: float = 1.0
 
     @property
     def scored(self) -> BoolArray:
@@ -62,8 +64,8 @@ class NoiseFit:
     innovation_std: float  # of e on the training rows, units of the output
     coefficients: FloatArray  # β, shape (q,)
     residual: FloatArray  # r, shape (N,)
-    minus_two_log: float  # n (log 2πσ² + 1) on the n training rows
-    rows: int  # n
+    minus_two_log: float  # n (log 2πσ² + 1) on the n measured values of the training rows
+    rows: float  # n
     # −2 log likelihood of the held-out rows with the trained figures; innovations beyond 5 σ count
     # as 5 σ, so that no single row outweighs all others
     held_minus_two_log: float
@@ -192,10 +194,10 @@ def _result(
     """Return what a fit left; ``count`` figures of its noise are its own and cost something."""
     inside = whitened_rows(residual, ar, blocks.train)
     outside = whitened_rows(residual, ar, blocks.held)
-    rows, total = len(inside), float(inside @ inside)
-    variance = max(total / max(rows, 1), TINY)
-    kept_back = np.minimum(outside**2, SURPRISE**2 * total / max(rows, 1))
-    log = math.log(2.0 * math.pi * variance)
+    total = float(inside @ inside)
+    variance = max(total / max(len(inside), 1), TINY)
+    kept_back = np.minimum(outside**2, SURPRISE**2 * total / max(len(inside), 1))
+    log, rows = math.log(2.0 * math.pi * variance), blocks.measured * len(inside)
     return NoiseFit(
         ar,
         math.sqrt(variance),
@@ -203,7 +205,7 @@ def _result(
         residual,
         rows * (log + 1.0),
         rows,
-        len(outside) * log + float(kept_back.sum()) / variance,
+        blocks.measured * (len(outside) * log + float(kept_back.sum()) / variance),
         count * math.log(max(rows, 2)),
     )
 
@@ -221,7 +223,7 @@ def information(
     """
     basis = projector(whitened_columns(shared, noise.ar, blocks.train))
     white = left_by(basis, whiten(columns, noise.ar)[blocks.train])
-    return np.asarray(white.T @ white / max(noise.innovation_std, 1e-300) ** 2)
+    return np.asarray(blocks.measured * white.T @ white / max(noise.innovation_std, 1e-300) ** 2)
 
 
 def shared_factors(

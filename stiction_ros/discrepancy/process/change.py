@@ -200,7 +200,8 @@ class _Search:
             white = left_by(basis, whiten(self._slopes(run, gap), ar)[train])
             step, *_ = np.linalg.lstsq(white, -target, rcond=1e-8)
             left = target + white @ step
-            variance = float(left @ left) / max(len(left) - len(step), 1)
+            told = base.blocks[output].measured * (len(left) - len(step))
+            variance = float(left @ left) / max(told, 1.0)
             spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(white.T @ white)) * variance, 0.0))
             seen = np.linalg.norm(white, axis=0) > ROUNDING * np.linalg.norm(target)
             count = int(free.sum())

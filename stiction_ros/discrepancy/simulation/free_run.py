@@ -242,7 +242,7 @@ class FreeRun:
         kept = np.concatenate(
             [self.runs.kept_back(r, phase) for r, phase in enumerate(self.runs.phases)]
         )
-        return Blocks(usable & ~kept, usable & kept)
+        return Blocks(usable & ~kept, usable & kept, 1.0 - self.runs.thinned[output])
 
     def drive(
         self, output: int, valve: int | None = None, stems: FloatArray | None = None

@@ -26,7 +26,7 @@ from stiction_ros.discrepancy.decision.scores import Scores, all_candidates, sco
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.gap.where import locate
-from stiction_ros.discrepancy.measures import ROUNDING, TURNS
+from stiction_ros.discrepancy.measures import TURNS
 from stiction_ros.discrepancy.process.change import open_figures, refitted_process
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import changed_again, process_first
@@ -79,7 +79,7 @@ def explained(state: State) -> bool:
     if state.doubted is None:
         return True
     base, before = state.now.base, state.doubted.now.base
-    if len(state.now.effects) < 2 or max(base.run.runs.thinned) > 0.0:
+    if len(state.now.effects) < 2:
         return False
     gained = before.score - base.score
     refused = state.doubted.looks[-1]
@@ -115,20 +115,15 @@ def scored_by(task: Task, state: State, k: int) -> Scores:
 
 
 def decided(task: Task, state: State, scores: Scores) -> Decision:
-    """Return what the scores allow to say.
-
-    Values between those that were kept are none that were measured: all evidence counts by the
-    share of the others.
-    """
+    """Return what the scores allow to say."""
     base = scores.base
-    measured = max(1.0 - max(task.runs.thinned), ROUNDING)
     possible = not_contradicted(base.run, scores.fits)
     allowed = [fit for fit in possible if not state.now.tells(fit)]
 
     def rests(fit: CandidateFit) -> int:
         return departures(base.run, fit.candidate, fit.point)
 
-    decision = decide(allowed, task.options.margin / measured, rests)
+    decision = decide(allowed, task.options.margin, rests)
     if task.options.process_fitted:
         decision = _in_doubt_of_place(base, decision)
     return told_by_stem(base.run, decision, allowed)
