@@ -2,7 +2,6 @@
 
 import dataclasses
 
-import casadi as ca
 import numpy as np
 import pytest
 import simulated_loops as loops
@@ -14,8 +13,6 @@ from stiction_ros.identification import FitStatus, Identification, VerdictKind
 from stiction_ros.paper.methods import identify
 from stiction_ros.paper.one_step_result import fit_outputs
 from stiction_ros.paper.paper_options import PaperOptions
-from stiction_ros.paper.programme.friction_programme import FrictionProgramme
-from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.reduced_programme import (
     ALPHA,
     Criterion,
@@ -31,7 +28,7 @@ from stiction_ros.paper.programme.starts import (
     inside,
     stiction_line,
 )
-from stiction_ros.paper.smoothed_laws import SMOOTH_LAWS, final_smoothing, smooth_law
+from stiction_ros.paper.smoothed_laws import final_smoothing, smooth_law
 from stiction_ros.records.record import Record
 from stiction_ros.signals.arx_fit import ArxOrders
 
@@ -144,30 +141,6 @@ def test_the_same_record_gives_the_same_result(found: Identification) -> None:
         found.outputs,
         found.search,
     )
-
-
-@pytest.mark.parametrize("law", sorted(SMOOTH_LAWS))
-def test_derivatives_are_those_of_the_objective_and_constraints(law: str) -> None:
-    record = loops.tank(1, samples=120)
-    orders = ArxOrders.over(2, 2, [2, 2])
-    if law == "kano":
-        orders = dataclasses.replace(orders, channels=((1, (2, 1)), (2, (1, 2))))
-    data = ProgrammeData.of(record.op, record.pv, np.ptp(record.op, axis=0), orders, law)
-    programme = FrictionProgramme(data, ((0, 1), (2, 0)))
-    x, about = ca.MX.sym("x", programme.frame.size), ca.MX.sym("f", 4)
-    price, tau = ca.MX.sym("price", 4), ca.DM([3.0, 6.0])
-    found = []
-    for point, order in ((about, 2), (x[:4], 0)):  # expanded, and as it is
-        objective, limits = programme._terms(x, point, tau, order)
-        lagrangian = 1.3 * objective + ca.dot(price, limits)
-        derived = [ca.gradient(objective, x), ca.jacobian(limits, x)]
-        found += [objective, limits, *derived, ca.hessian(lagrangian, x)[0]]
-    at = 0.2 * np.random.default_rng(0).standard_normal(programme.frame.size)
-    at[:4] = [0.4, 0.1, 0.3, 0.2]
-    values = ca.Function("both", [x, about, price], found)(at, at[:4], [0.3, 0.2, 0.5, 0.7])
-    arrays = [np.array(value) for value in values]
-    for mine, theirs in zip(arrays[:5], arrays[5:], strict=True):
-        assert np.abs(mine - theirs).max() <= 1e-9 * np.abs(theirs).max()
 
 
 @pytest.mark.trial

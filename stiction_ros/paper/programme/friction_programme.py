@@ -1,4 +1,4 @@
-r"""The paper's nonlinear programme (12) for one choice of delays.
+r"""The paper's nonlinear programme (12) for one choice of delays, as printed.
 
 .. math::
     \min_{f_S, f_D, \theta} \ \frac1p \sum_i \mathrm{SE}^{(i)} \quad (12a) \qquad
@@ -6,13 +6,11 @@ r"""The paper's nonlinear programme (12) for one choice of delays.
     \sigma^2(\hat\chi) \ge \alpha \, \sigma^2(u) \ (12f)
 
 with the stem of the smoothed law (12b) and the ARX prediction (12c). Single shooting: the
-unknowns are 2m frictions and, per output, n_a + m n_b coefficients and a constant.
-
-OP is scaled by its span, the objective by its value at the ARX start (15)-(16), and the
-coefficients by the triangular factor of the regressors at that start, so that the Hessian in
-them begins near a multiple of the identity. The Hessian is exact.
+unknowns are 2m frictions and, per output, n_a + m n_b coefficients and a constant. CasADi derives
+the gradients and the exact Hessian.
 """
 
+import functools
 from typing import Any
 
 import casadi as ca
@@ -20,22 +18,22 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper.one_step_result import EquationError, fit_outputs
-from stiction_ros.paper.programme.programme_data import Frame, ProgrammeData
 from stiction_ros.paper.programme.reduced_programme import ALPHA
 from stiction_ros.paper.search_log import SolvedStart, pairs
-from stiction_ros.signals.arx_fit import Delays
+from stiction_ros.paper.smoothed_laws import SmoothLaw, smooth_law
+from stiction_ros.records import Record
+from stiction_ros.signals.arx_fit import ArxFit, ArxOrders, Delays, regressors, stable_arx
 
 FEASIBILITY = 1e-6
-MAX_ITERATIONS = 60
 IPOPT = {
     "print_level": 0,
     "sb": "yes",
+    "max_iter": 60,
     "tol": 1e-5,
     "acceptable_tol": 1e-3,
     "acceptable_iter": 4,
     "mu_init": 1e-4,
-    # Data are scaled above; steep spots of the smoothed law must not scale the objective.
-    "nlp_scaling_method": "none",
+    # Starts lie on the border of the triangle, and stay there.
     "bound_push": 1e-8,
     "bound_frac": 1e-8,
     "slack_bound_push": 1e-8,
@@ -44,17 +42,29 @@ IPOPT = {
 
 
 class FrictionProgramme:
-    """Problem (12) for given delays; one solver serves every start."""
+    """Problem (12) for given delays; one solver serves every start.
 
-    def __init__(self, data: ProgrammeData, delays: Delays) -> None:
-        self.data, self.delays, self.frame = data, delays, Frame.of(data, delays)
-        self._solver = self._build_solver()
+    OP and PV are taken about their means. Coefficients beyond the orders of their channel are held
+    at 0.
+    """
 
-    def start(self, friction: FloatArray) -> FloatArray:
-        """Return unknowns with these frictions, shape (m, 2), %, and the ARX start (15)."""
-        x = np.zeros(self.frame.size)
-        x[: 2 * self.frame.valves] = (friction / self.data.op_span[:, None]).ravel()
-        return x
+    def __init__(
+        self, record: Record, limits: FloatArray, orders: ArxOrders, delays: Delays, law: str = "he"
+    ) -> None:
+        """Build for f_max = Δu of every valve, ``limits`` (m,), %."""
+        self.orders, self.delays, self.law = orders, delays, smooth_law(law)
+        self._op, self._pv = (part - part.mean(axis=0) for part in (record.op, record.pv))
+        self._valves = len(limits)
+        kept = [np.append(orders.kept(i, len(limits)), True) for i in range(len(delays))]
+        free = np.where(np.concatenate(kept), np.inf, 0.0)
+        self._low = np.concatenate([np.zeros(2 * len(limits)), -free])
+        self._high = np.concatenate([np.repeat(limits, 2), free])
+        fits = [
+            stable_arx(y, self._op.T, row, orders, mask[:-1])
+            for y, row, mask in zip(self._pv.T, delays, kept, strict=True)
+        ]
+        self._first = np.concatenate([_coefficients(fit) for fit in fits])
+        self._solver = self._built()
 
     def fitted(
         self, friction: FloatArray, smoothing: FloatArray
@@ -63,44 +73,23 @@ class FrictionProgramme:
 
         The frictions are rows (f_S, f_D), shape (m, 2), %; τ is one a valve, 1/%.
         """
-        span, data = self.data.op_span, self.data
-        stems = data.law.stems(data.op.T, friction / span[:, None], smoothing * span)
-        found = fit_outputs(data.pv.T, stems, self.delays, data.orders)
-        x = self.start(friction)
-        for i, fit in enumerate(found.fits):
-            theta = np.concatenate([fit.a, fit.b.ravel(), [fit.constant]])
-            place = 2 * self.frame.valves + i * self.frame.width
-            free = np.flatnonzero(np.append(data.orders.kept(i, self.frame.valves), True))
-            part = np.linalg.solve(
-                self.frame.basis[i][np.ix_(free, free)], (theta - self.frame.theta[i])[free]
-            )
-            x[place + free] = part
-        return x, found
+        stems = self.law.stems(self._op, friction, smoothing)
+        found = fit_outputs(self._pv, stems, self.delays, self.orders)
+        return np.concatenate([friction.ravel(), *map(_coefficients, found.fits)]), found
 
     def solve(
         self, start: FloatArray, smoothing: FloatArray, x: FloatArray | None = None
     ) -> SolvedStart:
         """Run IPOPT once from frictions, then solve the coefficients with the frictions held.
 
-        The unknowns ``x`` are those of the start (15) unless given.
+        The unknowns ``x`` are those frictions and the ARX start (15) unless given.
         """
-        count = 2 * self.frame.valves
-        low, high = np.full(self.frame.size, -np.inf), np.full(self.frame.size, np.inf)
-        low[:count], high[:count] = 0.0, np.repeat(self.data.limit / self.data.op_span, 2)
-        low[self.frame.held], high[self.frame.held] = 0.0, 0.0
-        answer = self._solver(
-            x0=self.start(start) if x is None else x,
-            p=smoothing * self.data.op_span,
-            lbx=low,
-            ubx=high,
-            lbg=0.0,
-            ubg=np.inf,
-        )
-        stats = self._solver.stats()
-        end = np.array(answer["x"]).ravel()
-        slack = np.array(answer["g"]).ravel()
-        friction = end[:count].reshape(-1, 2) * self.data.op_span[:, None]
-        objective, stable = float(answer["f"]) * self.frame.start_error, False
+        begun = np.concatenate([start.ravel(), self._first]) if x is None else x
+        bounds = {"lbx": self._low, "ubx": self._high, "lbg": 0.0, "ubg": np.inf}
+        answer, stats = self._solver(x0=begun, p=smoothing, **bounds), self._solver.stats()
+        end, slack = np.array(answer["x"]).ravel(), np.array(answer["g"]).ravel()
+        friction = end[: 2 * self._valves].reshape(-1, 2)
+        objective, stable = float(answer["f"]), False
         if np.isfinite(end).all():
             found = self.fitted(friction, smoothing)[1]
             objective = float(np.fmin(objective, found.squared_error))
@@ -117,75 +106,56 @@ class FrictionProgramme:
             stable=finite and stable,
         )
 
-    def _build_solver(self) -> Any:
-        """Return the solver; derivatives are those of stems expanded about the frictions of x."""
-        count = 2 * self.frame.valves
-        x, tau = ca.MX.sym("x", self.frame.size), ca.MX.sym("tau", self.frame.valves)
-        about, weight, price = ca.MX.sym("f", count), ca.MX.sym("w"), ca.MX.sym("v", count)
-        (f0, g0), (f1, g1), (f2, g2) = [self._terms(x, about, tau, k) for k in range(3)]
-        bent = ca.triu(ca.hessian(weight * f2 + ca.dot(price, g2), x)[0])
-
-        def here(*expressions: Any) -> list[Any]:
-            return list(ca.substitute(list(expressions), [about], [x[:count]]))
-
-        options: dict[str, Any] = {
-            "print_time": False,
-            "no_nlp_grad": True,
-            "calc_f": False,
-            "calc_g": False,
-            "calc_lam_p": False,
-            "ipopt": IPOPT | {"max_iter": MAX_ITERATIONS},
-            "grad_f": ca.Function(
-                "grad_f", [x, tau], here(f1, ca.gradient(f1, x)), ["x", "p"], ["f", "grad_f_x"]
-            ),
-            "jac_g": ca.Function(
-                "jac_g", [x, tau], here(g1, ca.jacobian(g1, x)), ["x", "p"], ["g", "jac_g_x"]
-            ),
-            "hess_lag": ca.Function(
-                "hess_lag",
-                [x, tau, weight, price],
-                here(bent),
-                ["x", "p", "lam_f", "lam_g"],
-                ["triu_hess_gamma_x_x"],
-            ),
-        }
-        objective, limits = here(f0, g0)
+    def _built(self) -> Any:
+        """Return the solver: (12a) subject to f_S − f_D (12e), σ²(χ)/(α σ²(u)) − 1 (12f) ≥ 0."""
+        count, m = self._op.shape
+        x, tau = ca.MX.sym("x", len(self._low)), ca.MX.sym("tau", m)
+        stem = smoothed_stem(count, self.law)
+        stems = [stem(op, x[2 * j : 2 * j + 2], tau[j]).T for j, op in enumerate(self._op.T)]
+        width = len(self._first) // len(self.delays)
+        theta = [x[2 * m + i * width :][:width] for i in range(len(self.delays))]
+        errors = [ca.sumsqr(self._residual(i, own, stems)) for i, own in enumerate(theta)]
+        ordered = [x[2 * j] - x[2 * j + 1] for j in range(m)]
+        moving = [
+            ca.sumsqr(one - ca.sum2(one) / count) / (ALPHA * float(op.var()) * count) - 1.0
+            for one, op in zip(stems, self._op.T, strict=True)
+        ]
+        objective, limits = sum(errors) / len(errors), ca.vertcat(*ordered, *moving)
         problem = {"x": x, "p": tau, "f": objective, "g": limits}
+        options: dict[str, Any] = {"print_time": False, "calc_lam_p": False, "ipopt": IPOPT}
         return ca.nlpsol("friction", "ipopt", problem, options)
 
-    def _terms(self, x: Any, about: Any, smoothing: Any, order: int) -> tuple[Any, Any]:
-        """Return (12a) over its start's value, f_S − f_D (12e) and σ²(χ)/(α σ²(u)) − 1 (12f)."""
-        count, valves = self.data.op.shape[1], self.frame.valves
-        stems = [self._stem(j, x, about, smoothing, order) for j in range(valves)]
-        total = sum(ca.sumsqr(self._residual(i, x, stems)) for i in range(self.frame.outputs))
-        ordered = [x[2 * j] - x[2 * j + 1] for j in range(valves)]
-        moving = [
-            ca.sumsqr(stem - ca.sum2(stem) / count) / (ALPHA * float(op.var()) * count) - 1.0
-            for stem, op in zip(stems, self.data.op, strict=True)
-        ]
-        return total / (self.frame.outputs * self.frame.start_error), ca.vertcat(*ordered, *moving)
-
-    def _stem(self, j: int, x: Any, about: Any, smoothing: Any, order: int) -> Any:
-        """Return χ of valve j, shape (1, N), as its Taylor polynomial in f_S and f_D."""
-        own = slice(2 * j, 2 * j + 2)
-        step, op = x[own] - about[own], self.data.op[j]
-        stem, *derived = self.data.stems[order].call([op, about[own], smoothing[j]])
-        for power, term in enumerate(derived, start=1):
-            for k in range(power):
-                term = ca.reshape(ca.mtimes(term, step) / (k + 1), len(op), -1)
-            stem = stem + term
-        return stem.T
-
-    def _residual(self, i: int, x: Any, stems: list[Any]) -> Any:
+    def _residual(self, i: int, theta: Any, stems: list[Any]) -> Any:
         """Return the error of the prediction (12c) of output i, shape (1, N − ε)."""
-        frame, orders, count = self.frame, self.data.orders, self.data.op.shape[1]
-        place = 2 * frame.valves + i * frame.width
-        theta = frame.theta[i] + ca.mtimes(ca.DM(frame.basis[i]), x[place : place + frame.width])
+        orders, count, y = self.orders, len(self._pv), self._pv[:, i]
+        past = regressors(y, self._op.T, self.delays[i], orders)[:, : orders.output]
         lagged = [
             stem[:, orders.first - delay - lag : count - delay - lag]
             for stem, delay in zip(stems, self.delays[i], strict=True)
             for lag in range(1, orders.input + 1)
         ]
         ones = ca.DM.ones(1, count - orders.first)
-        phi = ca.vertcat(ca.DM(frame.past[i].T), *lagged, ones)
-        return ca.mtimes(theta.T, phi) - ca.DM(self.data.pv[i, orders.first :][None, :])
+        phi = ca.vertcat(ca.DM(past.T), *lagged, ones)
+        return ca.mtimes(theta.T, phi) - ca.DM(y[None, orders.first :])
+
+
+@functools.lru_cache(maxsize=1)
+def smoothed_stem(samples: int, law: SmoothLaw) -> Any:
+    """Return the CasADi function of OP, shape (N,), (f_S, f_D) and τ that gives the stem, (N,)."""
+    symbols: Any = ca.SX.sym
+    state, pair = symbols("s", law.states), symbols("u", 2)
+    friction, smoothing = symbols("f", 2), symbols("tau")
+    figures = ca.vertcat(friction, smoothing)
+    entries, ends, told = (tuple(ca.vertsplit(each)) for each in (state, pair, figures))
+    following = ca.vertcat(*law.step(entries, ends, told, ca.tanh))
+    sample = ca.Function("sample", [state, pair, figures], [following], {"cse": True})
+    op = symbols("op", samples)
+    rest = ca.vertcat(op[0], np.zeros(law.states - 1))
+    pairs_of = ca.horzcat(op, ca.vertcat(op[0], op[:-1])).T
+    states = sample.mapaccum("states", samples)(rest, pairs_of, ca.repmat(figures, 1, samples))
+    return ca.Function("stem", [op, friction, smoothing], [states[0, :].T])
+
+
+def _coefficients(fit: ArxFit) -> FloatArray:
+    """Return θ of one output, (a, b, c), shape (n_a + m n_b + 1,)."""
+    return np.concatenate([fit.a, fit.b.ravel(), [fit.constant]])

@@ -20,7 +20,6 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper import one_step_result as one_step
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme
-from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.reduced_programme import Criterion, ReducedProgramme, StemTable
 from stiction_ros.paper.programme.starts import apparent_stictions, around, candidates, draw_starts
 from stiction_ros.paper.search_log import SolvedStart
@@ -174,10 +173,9 @@ def search_as_printed(
     stictions = np.minimum(apparent_stictions(record), limits)
     starts = draw_starts(limits, stictions, options.starts)
     smoothing = final_smoothing(limits)
-    data = ProgrammeData.of(record.op, record.pv, limits, orders, options.law)
     log: list[SolvedStart] = []
     for delays in choices:
-        programme = FrictionProgramme(data, delays)
+        programme = FrictionProgramme(record, limits, orders, delays, options.law)
         for start in starts:
             log.append(programme.solve(start, smoothing))
             progress(len(log) / (len(choices) * len(starts)))

@@ -6,7 +6,6 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper.one_step_result import check_record, fit_outputs, friction_limits
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme
 from stiction_ros.paper.programme.nlp import WIDTH
-from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.reduced_programme import Criterion, ReducedProgramme, StemTable
 from stiction_ros.paper.smoothed_laws import final_smoothing, smooth_law
 from stiction_studies.examples import Example
@@ -46,8 +45,7 @@ class _Well:
             tuple(example.delay(output, valve) for valve in record.valves)
             for output in record.outputs
         )
-        data = ProgrammeData.of(record.op, record.pv, self.limits, self.orders)
-        self.joint = FrictionProgramme(data, self.delays)
+        self.joint = FrictionProgramme(record, self.limits, self.orders, self.delays)
         self.criterion = Criterion(StemTable(record, self.limits, self.orders), self.delays)
         self.reduced = ReducedProgramme(self.criterion)
 
