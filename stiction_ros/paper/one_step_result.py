@@ -20,7 +20,6 @@ from stiction_ros.signals.holds import holds
 
 SETTLED = 0.5  # share of a hold after which OP has settled
 REPEATED = 0.5  # of the larger of two spans that come from the same cycle
-ALIKE = 0.9
 PARTS = 8
 MIN_PART = 4  # samples of a part that is looked at
 DEFAULT_ORDER = 3
@@ -31,46 +30,13 @@ NO_EVIDENCE = (
 )
 
 
-@dataclasses.dataclass(frozen=True)
-class SustainedOscillation:
-    """Δu of one valve, to which Section 3.2 limits friction, and what speaks for it.
+def oscillation_spans(record: Record) -> FloatArray:
+    """Return Δu of every valve, to which Section 3.2 limits friction, shape (m,), %.
 
     A record is cut where a set-point moves, else into eight parts. Of each hold the second half
     counts. Δu is the largest span that another one reaches by half: what comes once is a transient.
+    Where no part repeats another it is the span of OP over the record.
     """
-
-    valve: str  # tag
-    whole: float  # span of OP over the record, %
-    spans: tuple[float, ...]  # of OP in each part, %
-
-    @property
-    def repeated(self) -> float | None:
-        """The largest span that another part reaches by half, %; None for none."""
-        pairs = itertools.pairwise(sorted(self.spans, reverse=True))
-        return next((large for large, small in pairs if small >= REPEATED * large > 0.0), None)
-
-    @property
-    def span(self) -> float:
-        """Δu, %; the span of OP over the record where no part repeats another."""
-        return self.whole if self.repeated is None else self.repeated
-
-    @property
-    def alike(self) -> int:
-        """Number of parts whose span is Δu within a tenth."""
-        return sum(ALIKE * self.span <= span <= self.span for span in self.spans)
-
-    def __str__(self) -> str:
-        """Return the evidence in one line."""
-        if self.repeated is None:
-            return f"Δu of {self.valve} {self.span:.3g} %: no oscillation repeats, OP's whole span"
-        return (
-            f"Δu of {self.valve} {self.span:.3g} %, within a tenth in {self.alike} of "
-            f"{len(self.spans)} parts; OP spans {self.whole:.3g} %"
-        )
-
-
-def sustained_oscillations(record: Record) -> tuple[SustainedOscillation, ...]:
-    """Return Δu of every valve of a record, with its evidence."""
     rows = [] if record.sp is None else holds(record.sp)
     if len(rows) < 2:  # equal parts where no set-point moves, else the settled half of every hold
         edges = np.linspace(0, len(record), PARTS + 1).astype(int).tolist()
@@ -78,10 +44,14 @@ def sustained_oscillations(record: Record) -> tuple[SustainedOscillation, ...]:
     else:
         rows = [(begin + int(SETTLED * (end - begin)), end) for begin, end in rows]
     parts = [slice(begin, end) for begin, end in rows if end - begin >= MIN_PART]
-    return tuple(
-        SustainedOscillation(tag, float(np.ptp(op)), tuple(float(np.ptp(op[p])) for p in parts))
-        for tag, op in zip(record.valves, record.op.T, strict=True)
-    )
+    found = []
+    for op in record.op.T:
+        pairs = itertools.pairwise(
+            sorted((float(np.ptp(op[part])) for part in parts), reverse=True)
+        )
+        repeated = (large for large, small in pairs if small >= REPEATED * large > 0.0)
+        found.append(next(repeated, float(np.ptp(op))))
+    return np.array(found)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -141,8 +111,7 @@ def friction_limits(record: Record, options: PaperOptions) -> FloatArray:
     OP spans.
     """
     if options.friction_limit is None:
-        found = [one.span for one in sustained_oscillations(record)]
-        return np.asarray(found, dtype=float)
+        return oscillation_spans(record)
     return limited(np.ptp(record.op, axis=0), options.friction_limit)
 
 
@@ -178,7 +147,8 @@ def result(
     )
     notes = [*record.notes, NO_EVIDENCE]
     if options.friction_limit is None:
-        notes += [f"largest friction tried: {one}" for one in sustained_oscillations(record)]
+        spans = zip(record.valves, limits, strict=True)
+        notes += [f"largest friction tried: Δu of {tag} {span:.3g} %" for tag, span in spans]
     if options.output_order is None:
         notes.append(f"orders were not given: n_a = {DEFAULT_ORDER} was taken")
     log = SearchLog(

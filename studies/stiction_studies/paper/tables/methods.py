@@ -4,7 +4,7 @@ import platform
 
 from stiction_ros.config_files import find_config
 from stiction_ros.paper.grid_search import count_points
-from stiction_ros.paper.one_step_result import sustained_oscillations
+from stiction_ros.paper.one_step_result import oscillation_spans
 from stiction_ros.paper.search_log import PaperIdentification
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import printed_example
@@ -26,7 +26,7 @@ def table_of_times(sources: Sources) -> Exhibit:
     for number in (1, 2):
         printed, example = printed_example(number), sources.example(number)
         base = sources.found(number, "exact").seconds
-        spans = ", ".join(f"{one.span:.3g}" for one in sustained_oscillations(example.record))
+        spans = ", ".join(f"{span:.3g}" for span in oscillation_spans(example.record))
         times = {"nlp": printed.nlp_seconds, "nlp_printed": printed.nlp_seconds}
         times["grid"] = printed.grid_seconds
         for method, name in NAMES.items():
