@@ -44,7 +44,6 @@ class Axis:
     high: float
     points: int  # of the first grid
     logarithmic: bool = False  # whether the points are in proportion
-    whole: bool = False  # whether only whole numbers count
     # whether the response is a straight line in it, so that its best value is the vertex of a
     # parabola
     linear: bool = False
@@ -54,8 +53,7 @@ class Axis:
         """Return the first grid, in coordinates of the search."""
         low, high = self.inner(self.low), self.inner(self.high)
         middle = [0.5 * (low + high)]
-        values = np.linspace(low, high, self.points) if self.points > 1 else np.array(middle)
-        return np.unique(np.rint(values)) if self.whole else values
+        return np.linspace(low, high, self.points) if self.points > 1 else np.array(middle)
 
     def inner(self, value: float) -> float:
         """Return the coordinate of the search that belongs to a value."""
@@ -63,8 +61,6 @@ class Axis:
 
     def outer(self, coordinates: FloatArray) -> FloatArray:
         """Return the values that belong to coordinates, kept within the ends."""
-        if self.whole:
-            coordinates = np.rint(coordinates)
         values = np.exp(coordinates) if self.logarithmic else coordinates
         return np.minimum(np.maximum(values, self.low), self.high)
 
@@ -75,7 +71,7 @@ class Axis:
         low, high = self.inner(self.low), self.inner(self.high)
         near = ON_BOUND * (high - low)
         at = self.inner(value)
-        return at > high - near or (not self.whole and at < low + near)
+        return not low + near <= at <= high - near
 
     @property
     def spacing(self) -> float:

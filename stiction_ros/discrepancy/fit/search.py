@@ -197,10 +197,8 @@ class _Search:
         """Return the best of a grid around a point and that point, with its coordinates."""
         axes = self.candidate.axes
         steps = np.array([axis.spacing for axis in axes])
-        whole = np.array([axis.whole for axis in axes])
         offsets = np.array(list(itertools.product(*[(0.0,) if a.linear else SIDES for a in axes])))
-        span = np.where(whole, np.maximum(np.rint(size * steps), 1.0), size * steps)
-        found = self._try(best[0] + offsets * span, best[1], under)
+        found = self._try(best[0] + offsets * (size * steps), best[1], under)
         return found if under is not None or found[1].delta_bic >= best[1].delta_bic else best
 
     @property

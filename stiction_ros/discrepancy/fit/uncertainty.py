@@ -50,8 +50,7 @@ class Region:
             return cls(fit.point[None, :], np.zeros(1))
         bound = STEPPED if fit.candidate.stepped else SMOOTH
         centre = fit.candidate.coordinates(fit.point)
-        least = np.array([1.0 if axes[d].whole else 0.0 for d in free])
-        width = np.maximum([SLIGHT * axes[d].spacing for d in free], least)
+        width = np.array([SLIGHT * axes[d].spacing for d in free])
         halton, random = halton_sequence(len(free), seed=0), np.random.default_rng(0)
         points, scores = np.zeros((0, len(axes))), np.zeros(0)
         kept = points
@@ -66,7 +65,7 @@ class Region:
             points, scores = np.vstack([points, tried]), np.concatenate([scores, found])
             kept = points[scores - scores.min() <= bound]
             reach = np.abs(kept[:, free] - centre[free]).max(axis=0, initial=0.0)
-            width = np.maximum(np.clip(1.5 * reach, 0.3 * width, 3.0 * width), least)
+            width = np.clip(1.5 * reach, 0.3 * width, 3.0 * width)
         excess = scores - scores.min()
         inside = excess <= bound
         return cls(fit.candidate.values(points[inside]), excess[inside])
