@@ -5,7 +5,7 @@ numbers.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
@@ -104,11 +104,7 @@ class SimulatedPlant:
         return dataclasses.replace(self, plant=self.plant.with_ideal_valves(), valve_changes=())
 
     def run(
-        self,
-        controller: Controller,
-        seed: int | None = None,
-        samples: int | None = None,
-        progress: Callable[[int], None] | None = None,
+        self, controller: Controller, seed: int | None = None, samples: int | None = None
     ) -> ClosedLoopRun:
         """Simulate the plant under ``controller``; ``seed`` and ``samples`` in place of its own."""
         return simulate_closed_loop(
@@ -117,8 +113,7 @@ class SimulatedPlant:
             self.set_points,
             self.samples if samples is None else samples,
             self.seed if seed is None else seed,
-            progress,
-            self.valve_changes,
+            valve_changes=self.valve_changes,
         )
 
 
@@ -350,7 +345,6 @@ def run_live(
     samples: int | None = None,
     ideal_valves: bool = False,
     identify: bool = True,
-    progress: Callable[[int], None] | None = None,
 ) -> LiveRun:
     """Run the loop of ``scenario`` with its estimator and its swaps.
 
@@ -359,7 +353,6 @@ def run_live(
         seed, samples: in place of the scenario's.
         ideal_valves: run with valves that follow OP exactly, to the end.
         identify: whether the estimator runs; without it the controller stays as it starts.
-        progress: as in :func:`stiction_ros.loop.simulate_closed_loop`.
 
     Returns:
         Signals, every fit and every change of the controller, in order.
@@ -376,4 +369,4 @@ def run_live(
     """
     told = scenario.with_ideal_valves() if ideal_valves else scenario
     loop = LoopSession(scenario, told.plant, identify)
-    return loop.told(told.run(loop, seed, samples, progress))
+    return loop.told(told.run(loop, seed, samples))

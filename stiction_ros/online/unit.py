@@ -7,7 +7,7 @@ settings and seed both give the same numbers.
 
 import copy
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -126,7 +126,6 @@ def run_unit(
     samples: int | None = None,
     ideal_valves: bool = False,
     identify: bool = True,
-    progress: Callable[[int], None] | None = None,
 ) -> dict[str, LiveRun]:
     """Run all loops of ``scenario`` on their plant, with their estimators and swaps.
 
@@ -135,7 +134,6 @@ def run_unit(
         seed, samples: in place of the scenario's.
         ideal_valves: run with valves that follow OP exactly, to the end.
         identify: whether the estimators run; without them the controllers stay as they start.
-        progress: as in :func:`stiction_ros.loop.simulate_closed_loop`.
 
     Returns:
         What happened in each loop, by its name. An outer loop has no stem.
@@ -156,7 +154,7 @@ def run_unit(
             op[-1].append(session(seen, wiring.of(loop, in_force[-1])))
         return wiring.take(op[-1])
 
-    run, found = told.run(controllers, seed, samples, progress), {}
+    run, found = told.run(controllers, seed, samples), {}
     for loop, session, given in zip(wiring.loops, sessions, zip(*op, strict=True), strict=True):
         columns = [model.valve_names.index(tag) for tag in loop.valves if tag in model.valve_names]
         stem = run.record.stem if len(columns) == len(loop.valves) else None
