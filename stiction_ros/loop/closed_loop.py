@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -15,13 +14,8 @@ from stiction_ros.loop.set_points import SetPoints
 from stiction_ros.loop.valve_changes import ValveChange
 from stiction_ros.records import Record
 
-
-class Controller(Protocol):
-    """Anything that turns a measurement and set-points into controller outputs."""
-
-    def __call__(self, measurement: Measurement, sp: FloatArray) -> FloatArray:
-        """Return OP, shape (m,), %, for PV and set-points, shape (p,) each."""
-        ...
+# gives OP, shape (m,), %, for a measurement and set-points, shape (p,)
+Controller = Callable[[Measurement, FloatArray], FloatArray]
 
 
 @dataclasses.dataclass(frozen=True)
