@@ -155,6 +155,15 @@ def test_wheels_would_stand_on_a_public_index(wheels: list[Path]) -> None:
         assert not [name for name in names if "test" in name.split("/") or name.endswith(data)]
 
 
+def test_the_wheel_holds_every_file_that_is_read_beside_the_modules(wheels: list[Path]) -> None:
+    ends = ("css", "js", "json", "pyi", "typed", "yaml")
+    files = (file for end in ends for file in (ROOT / "stiction_ros").rglob(f"*.{end}"))
+    beside = {file.relative_to(ROOT).as_posix() for file in files}
+    with zipfile.ZipFile(wheels[0]) as content:
+        assert beside <= set(content.namelist())
+    assert {"stiction_ros/pages/frame.css", "stiction_ros/pages/plot.js"} <= beside
+
+
 @pytest.mark.trial
 def test_the_first_program_of_the_readme_runs_with_the_core_alone(
     pip_prefix: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
