@@ -11,7 +11,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.gain.embedding import EmbeddingDesign, EmbeddingRun
 from stiction_ros.gain.gain import Gain, Option, What, option_of
 from stiction_ros.gain.measures import Measures, Yardstick, cycle_period
-from stiction_ros.gain.retuning import Tuning, calm, frequencies, most_helpful, peak
+from stiction_ros.gain.retuning import SHIFTS, Tuning, calm, most_helpful, peak
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.closed_loop import Controller, own_controller, simulate_closed_loop
 from stiction_ros.loop.model import PiTuning
@@ -108,13 +108,13 @@ def _tuned(model: LoopModel, tuning: Tuning) -> LoopModel:
 
 def _peak_of(model: LoopModel) -> Callable[[Tuning], float]:
     """Return what gives the peak of the sensitivity of the loop without friction."""
-    linear, turn = model.process.linear(model.sample_time), frequencies()
+    linear = model.process.linear(model.sample_time)
     eye = np.eye(linear.order)
-    plant = [linear.c[0] @ np.linalg.solve(eye / q - linear.a, linear.b[:, 0]) for q in turn]
+    plant = [linear.c[0] @ np.linalg.solve(eye / q - linear.a, linear.b[:, 0]) for q in SHIFTS]
 
     def peak_of(tuning: Tuning) -> float:
         own = own_controller(_tuned(model, tuning)).tuning
-        control = own.gain * (1.0 + model.sample_time / own.integral_time / (1.0 - turn))
+        control = own.gain * (1.0 + model.sample_time / own.integral_time / (1.0 - SHIFTS))
         return peak(np.asarray(control * np.array(plant)))
 
     return peak_of

@@ -42,8 +42,11 @@ TRIED = 5
 WORTH = 0.03
 """Share of the IAE that another tuning must save to be named."""
 
-FREQUENCIES = 300
-"""Frequencies at which the sensitivity is looked at."""
+FREQUENCIES = np.geomspace(1e-4, 1.0, 300)
+"""At which loops are looked at, over the highest one, shape (F,)."""
+
+SHIFTS: ComplexArray = np.exp(-1j * np.pi * FREQUENCIES)
+"""The backward shift q at each of them, shape (F,)."""
 
 PULSE = 1000
 """Samples of the answer of a predictive controller to a pulse of PV."""
@@ -130,37 +133,25 @@ def _mean(runs: Sequence[Measures | None], key: str) -> float:
 
 def sensitivity(loop: RecordedLoop, draws: Draws, tuning: Tuning) -> float:
     r"""Return the peak of :math:`|1 / (1 + C P)|` of the first loop, its valve without friction."""
-    turn = frequencies()
-    return peak(controller_response(loop, tuning, turn) * process_response(loop, draws, 0, turn))
+    return peak(controller_response(loop, tuning) * process_response(loop, draws, 0))
 
 
-def controller_response(loop: RecordedLoop, tuning: Tuning, turn: ComplexArray) -> ComplexArray:
-    """Return C of the controller that is there, with factors on its tuning, shape (F,).
-
-    Args:
-        loop: scaled.
-        tuning: factors.
-        turn: the backward shift q at each frequency, shape (F,).
-    """
+def controller_response(loop: RecordedLoop, tuning: Tuning) -> ComplexArray:
+    """Return C of the controller that is there, with factors on its tuning, shape (F,)."""
     law = loop.law
     gain, reset, rate = tuning.applied(law.coefficients[None])[0]
-    control = gain + reset / (1.0 - turn) + rate * (1.0 - turn)
+    control = gain + reset / (1.0 - SHIFTS) + rate * (1.0 - SHIFTS)
     return np.asarray(
-        control * (1.0 - law.smoothing) / (1.0 - law.smoothing * turn) * turn**law.lag
+        control * (1.0 - law.smoothing) / (1.0 - law.smoothing * SHIFTS) * SHIFTS**law.lag
     )
 
 
-def process_response(loop: RecordedLoop, draws: Draws, r: int, turn: ComplexArray) -> ComplexArray:
+def process_response(loop: RecordedLoop, draws: Draws, r: int) -> ComplexArray:
     """Return P from the stem that is looked at to its output, of one draw, shape (F,)."""
     (a, b, delay, _), i, j = draws.equations, loop.output, loop.valve
-    poles = np.polyval(np.concatenate([a[r, i, ::-1], [1.0]]), turn)
-    zeros = np.polyval(b[r, i, j, ::-1], turn)
-    return np.asarray(zeros * turn ** (1 + int(delay[i, j])) / poles)
-
-
-def frequencies() -> ComplexArray:
-    """Return the backward shift q on the frequencies that are looked at, shape (F,)."""
-    return np.asarray(np.exp(-1j * np.pi * np.geomspace(1e-4, 1.0, FREQUENCIES)))
+    poles = np.polyval(np.concatenate([a[r, i, ::-1], [1.0]]), SHIFTS)
+    zeros = np.polyval(b[r, i, j, ::-1], SHIFTS)
+    return np.asarray(zeros * SHIFTS ** (1 + int(delay[i, j])) / poles)
 
 
 def peak(open_loop: ComplexArray) -> float:
@@ -180,22 +171,18 @@ def times_as_fast(loop: RecordedLoop, design: ControlDesign, draws: Draws) -> fl
         design: of the other, scaled, its valve without friction.
         draws: loops; the median of them is given.
     """
-    turn = frequencies()
-    present = controller_response(loop, UNCHANGED, turn)
-    other = predictive_response(design, turn)
+    present, other = controller_response(loop, UNCHANGED), predictive_response(design)
     ratios = []
     for r in range(len(draws)):
-        process = process_response(loop, draws, r, turn)
+        process = process_response(loop, draws, r)
         ratios.append(_crossover(other * process) / _crossover(present * process))
     return float(np.median(ratios))
 
 
-def predictive_response(design: ControlDesign, turn: ComplexArray) -> ComplexArray:
+def predictive_response(design: ControlDesign) -> ComplexArray:
     """Return C' from SP − PV to the stem, shape (F,), by how OP answers a pulse of PV.
 
-    Args:
-        design: of the controller of one valve and one output; the weights are the embedding's.
-        turn: the backward shift q at each frequency, shape (F,).
+    The ``design`` is of the controller of one valve and one output, with the embedding's weights.
     """
     linear = dataclasses.replace(design, unaware=design.embedding)
     control, model = MpcController(linear, ControlMode.UNAWARE), design.model
@@ -206,11 +193,10 @@ def predictive_response(design: ControlDesign, turn: ComplexArray) -> ComplexArr
         pv = model.pv0 + pulse if k == 0 else model.pv0
         op.append(control.step(pv, model.pv0, dv, op[-1]).op)
     moves = np.diff(op, axis=0)[:, 0] / pulse[0]
-    return np.asarray(-(turn[:, None] ** np.arange(PULSE) @ moves) / (1.0 - turn))
+    return np.asarray(-(SHIFTS[:, None] ** np.arange(PULSE) @ moves) / (1.0 - SHIFTS))
 
 
 def _crossover(open_loop: ComplexArray) -> float:
     """Return the lowest frequency at which an open loop falls below 1, in those looked at."""
     below = np.flatnonzero(np.abs(open_loop) < 1.0)
-    place = int(below[0]) if len(below) else len(open_loop) - 1
-    return float(np.geomspace(1e-4, 1.0, len(open_loop))[place])
+    return float(FREQUENCIES[below[0] if len(below) else -1])

@@ -2,7 +2,7 @@ import numpy as np
 
 from stiction_ros.control import ControlMode, MpcController
 from stiction_ros.control_settings import ControlSettings
-from stiction_ros.gain.retuning import frequencies, predictive_response
+from stiction_ros.gain.retuning import SHIFTS, predictive_response
 from stiction_ros.loop import LoopModel
 
 MODEL = {
@@ -33,8 +33,8 @@ def test_the_response_is_that_of_the_controller() -> None:
     for k in range(600):
         op = control.step(np.array([1.0 if k == 5 else 0.0]), np.zeros(1), np.zeros(0), op).op
         ops.append(float(op[0]))
-    turn = frequencies()[100::20]
+    turn = SHIFTS[100::20]
     moves = np.diff(ops[4:])
     summed = np.array([np.sum(moves * q ** np.arange(len(moves))) for q in turn])
-    told = -predictive_response(design, turn) * (1.0 - turn)
+    told = -predictive_response(design)[100::20] * (1.0 - turn)
     np.testing.assert_allclose(told, summed, rtol=1e-4, atol=1e-6)
