@@ -31,21 +31,19 @@ NEAR_LIMIT = 1e-6  # share of OP's range within which it stands at an end of it
 
 @dataclasses.dataclass(frozen=True)
 class Assessed:
-    """What is said of one loop: its row, HTML of its page, which may be empty, and decisions."""
+    """What is said of one loop."""
 
-    entry: Entry
-    page: str = ""
-    log: tuple[str, ...] = ()
+    entry: Entry  # its row
+    page: str = ""  # HTML of its page, which may be empty
+    log: tuple[str, ...] = ()  # what was decided
+    again: bool = False  # whether a survey that goes on should try the loop anew
 
 
 def assess(loop: Loop, options: SurveyOptions) -> Assessed:
     """Return what is said of a loop; whatever goes wrong is said there and not raised."""
-    files = tuple(str(file) for file in loop.files)
-    notes = tuple(loop.notes)
-    entry = Entry(loop.name, files, Status.FAILED, op_unit=loop.op_unit, notes=notes)
     if loop.problem is not None or not loop.parts:
-        reason = loop.problem or "it holds no samples"
-        return _ended(entry, Status.FAILED, reason)
+        return failed(loop, loop.problem or "it holds no samples")
+    entry = _row_of(loop)
     try:
         return _assessed(loop, entry, options)
     except InputError as error:
@@ -57,6 +55,17 @@ def assess(loop: Loop, options: SurveyOptions) -> Assessed:
             f"line {place.lineno}); the other loops are not touched"
         )
         return _ended(_described(entry, loop.parts), Status.FAILED, reason)
+
+
+def failed(loop: Loop, reason: str, *, again: bool = False) -> Assessed:
+    """Return a loop that could not be judged, for a reason that may pass when tried ``again``."""
+    return dataclasses.replace(_ended(_row_of(loop), Status.FAILED, reason), again=again)
+
+
+def _row_of(loop: Loop) -> Entry:
+    """Return the row of a loop of which nothing is known but what was read."""
+    files = tuple(map(str, loop.files))
+    return Entry(loop.name, files, Status.FAILED, op_unit=loop.op_unit, notes=loop.notes)
 
 
 def _ended(entry: Entry, status: Status, reason: str) -> Assessed:

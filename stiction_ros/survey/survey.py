@@ -94,11 +94,11 @@ def survey(
         Journal(out, plan.options.mark(), resume=plan.resume) as journal,
         contextlib.closing(engine),
     ):
-        for done in engine.run(tasks(), plan.options):
-            entry = journal.with_page(done.assessed.entry, done.assessed.page)
-            if not done.again:
-                journal.add(done.task.key, entry)
-            keep(done.task.key, entry, done.assessed.log)
+        for task, found in engine.run(tasks(), plan.options):
+            entry = journal.with_page(found.entry, found.page)
+            if not found.again:
+                journal.add(task.key, entry)
+            keep(task.key, entry, found.log)
     rows, groups = grouped(sorted(entries.values(), key=lambda entry: entry.name))
     order = ranked(rows, plan.costs)
     seconds = time.perf_counter() - begun

@@ -9,8 +9,8 @@ from made import entry, identification, record, unreadable
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.loop import Loop
-from stiction_ros.survey.assess import Assessed
-from stiction_ros.survey.engines.engine import Done, Task, lost
+from stiction_ros.survey.assess import Assessed, failed
+from stiction_ros.survey.engines.engine import Task
 from stiction_ros.survey.entry import Entry, Status, SurveyOptions
 from stiction_ros.survey.listing.tables import HEAD, write_csv, write_xlsx
 from stiction_ros.survey.survey import Plan, survey
@@ -37,13 +37,13 @@ class Counting:
         self.closed = False
         self._stop = stop_after
 
-    def run(self, tasks: Iterator[Task], options: SurveyOptions) -> Iterator[Done]:
+    def run(self, tasks: Iterator[Task], options: SurveyOptions) -> Iterator[tuple[Task, Assessed]]:
         for task in tasks:
             if self._stop is not None and len(self.given) == self._stop:
                 raise KeyboardInterrupt
             self.given.append(task.loop.name)
             found = dataclasses.replace(entry(task.loop.name), files=())
-            yield Done(task, Assessed(found, f"<p>{task.loop.name}</p>", ("a decision",)))
+            yield task, Assessed(found, f"<p>{task.loop.name}</p>", ("a decision",))
 
     def close(self) -> None:
         self.closed = True
@@ -87,10 +87,10 @@ def test_a_survey_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> No
 class Losing(Counting):
     """An engine whose worker dies with one loop."""
 
-    def run(self, tasks: Iterator[Task], options: SurveyOptions) -> Iterator[Done]:
-        for done in super().run(tasks, options):
-            ended = done.task.loop.name == "FIC001"
-            yield lost(done.task, "its worker ended", again=True) if ended else done
+    def run(self, tasks: Iterator[Task], options: SurveyOptions) -> Iterator[tuple[Task, Assessed]]:
+        for task, found in super().run(tasks, options):
+            ended = task.loop.name == "FIC001"
+            yield task, failed(task.loop, "its worker ended", again=True) if ended else found
 
 
 def test_a_loop_whose_worker_died_is_tried_again(tmp_path: Path) -> None:

@@ -6,8 +6,8 @@ It runs whatever it is sent, so it belongs into a closed network, or behind TLS 
 from typing import Any
 
 from stiction_ros.errors import InputError
-from stiction_ros.survey.assess import Assessed, assess
-from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Engine, Task, lost
+from stiction_ros.survey.assess import Assessed, assess, failed
+from stiction_ros.survey.engines.engine import ATTEMPTS, Engine, Task
 from stiction_ros.survey.entry import SurveyOptions
 
 SCHEME = "dask://"
@@ -70,15 +70,15 @@ class DaskEngine(Engine):
         name = f"stiction-{task.key}-{self._client.id}"  # results of others are not ours
         return self._client.submit(assess, task.loop, options, key=name, retries=ATTEMPTS)
 
-    def outcome(self, task: Task, future: Any, attempt: int) -> Done:
+    def outcome(self, task: Task, future: Any, attempt: int) -> Assessed:
         """Return what the cluster says of a loop, or that it gave it up."""
         failure = future.exception()  # waits where an answer was lost: it is made once more
         if failure is not None or future.cancelled():
             reason = failure or future.status
-            return lost(task, f"the cluster gave it up: {reason}", again=True)
+            return failed(task.loop, f"the cluster gave it up: {reason}", again=True)
         answer = future.result()
         assert isinstance(answer, Assessed)
-        return Done(task, answer)
+        return answer
 
     def close(self) -> None:
         """Leave the cluster; what was handed in and not taken out is dropped there."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.assess import Assessed
-from stiction_ros.survey.entry import Entry, Status, SurveyOptions
+from stiction_ros.survey.entry import SurveyOptions
 
 ATTEMPTS = 3  # times that a loop is tried whose worker dies: it may kill workers
 
@@ -19,15 +19,6 @@ class Task:
 
     key: str
     loop: Loop
-
-
-@dataclasses.dataclass(frozen=True)
-class Done:
-    """One loop that was judged; ``again`` where a survey that goes on should try it anew."""
-
-    task: Task
-    assessed: Assessed
-    again: bool = False
 
 
 class Engine(ABC):
@@ -46,14 +37,14 @@ class Engine(ABC):
         """Hand over a loop and return its future."""
 
     @abstractmethod
-    def outcome(self, task: Task, future: Any, attempt: int) -> Done | None:
+    def outcome(self, task: Task, future: Any, attempt: int) -> Assessed | None:
         """Return what came of an attempt, from 1; None where the loop is to be tried once more."""
 
     @abstractmethod
     def close(self) -> None:
         """Let go of workers, whatever they are doing."""
 
-    def run(self, tasks: Iterable[Task], options: SurveyOptions) -> Iterator[Done]:
+    def run(self, tasks: Iterable[Task], options: SurveyOptions) -> Iterator[tuple[Task, Assessed]]:
         """Yield what is said of each loop as it comes; tasks are drawn no faster than needed."""
         waiting, coming = iter(tasks), queue.SimpleQueue[str]()
         given: dict[str, tuple[Task, Any, int]] = {}
@@ -70,23 +61,10 @@ class Engine(ABC):
                 if not given:
                     return
                 task, future, attempt = given.pop(coming.get())
-                done = self.outcome(task, future, attempt)
-                if done is None:
+                assessed = self.outcome(task, future, attempt)
+                if assessed is None:
                     hand_over(task, attempt + 1)
                 else:
-                    yield done
+                    yield task, assessed
         finally:
             self.close()
-
-
-def lost(task: Task, reason: str, *, again: bool = False) -> Done:
-    """Return a loop that could not be judged, for a reason that may pass when tried ``again``."""
-    loop = task.loop
-    entry = Entry(
-        loop.name,
-        tuple(str(file) for file in loop.files),
-        Status.FAILED,
-        reason,
-        notes=tuple(loop.notes),
-    )
-    return Done(task, Assessed(entry, log=(f"failed: {reason}",)), again)

@@ -12,8 +12,8 @@ from concurrent.futures.process import BrokenProcessPool
 from stiction_ros.errors import InputError
 from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.orphans import spared
-from stiction_ros.survey.assess import Assessed, assess
-from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Engine, Task, lost
+from stiction_ros.survey.assess import Assessed, assess, failed
+from stiction_ros.survey.engines.engine import ATTEMPTS, Engine, Task
 from stiction_ros.survey.entry import SurveyOptions
 
 LONGEST = 600.0  # seconds that one loop may take; a usual one takes a second or two
@@ -48,19 +48,19 @@ class LocalEngine(Engine):
             )
         return worker
 
-    def outcome(self, task: Task, future: Future[Assessed], attempt: int) -> Done | None:
+    def outcome(self, task: Task, future: Future[Assessed], attempt: int) -> Assessed | None:
         """Return what a worker says of a loop; where it has died, that the loop is given up."""
         worker = self._busy.pop(task.key)
         self._idle.append(worker)
         if not isinstance(future.exception(), BrokenProcessPool):
-            return Done(task, future.result())
+            return future.result()
         code = worker.ended()
         if code == -signal.SIGALRM:
-            return lost(task, f"it took more than {self._longest:g} s and was given up")
+            return failed(task.loop, f"it took more than {self._longest:g} s and was given up")
         if attempt < ATTEMPTS:
             return None
         told = f"its worker ended {ATTEMPTS} times, the last time with {_said(code)}"
-        return lost(task, told, again=True)
+        return failed(task.loop, told, again=True)
 
     def close(self) -> None:
         """End all workers."""

@@ -88,9 +88,9 @@ def test_a_lost_worker_loses_no_loop(cluster: Cluster, tmp_path: Path) -> None:
     engine = _engine(cluster, 2)
     count = 60
     keys = []
-    for done in engine.run((Task(str(k), unreadable(k)) for k in range(count)), OPTIONS):
-        keys.append(done.task.key)
-        assert done.assessed.entry.reason == "has no column OP"
+    for task, found in engine.run((Task(str(k), unreadable(k)) for k in range(count)), OPTIONS):
+        keys.append(task.key)
+        assert found.entry.reason == "has no column OP"
         if len(keys) == 10:
             os.kill(first.pid, signal.SIGKILL)
     engine.close()
@@ -113,7 +113,7 @@ def test_an_answer_lost_before_it_is_fetched_is_made_once_more(cluster: Cluster)
         os.kill(first.pid, signal.SIGKILL)
         _until(lambda: not watcher.nthreads())
         cluster.work()
-        reasons += [done.assessed.entry.reason for done in run]
+        reasons += [found.entry.reason for _, found in run]
     engine.close()
     assert reasons == ["has no column OP"] * 3
 

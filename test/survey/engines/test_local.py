@@ -49,18 +49,18 @@ def test_every_loop_comes_back_with_its_reason_and_is_drawn_no_faster() -> None:
     for one in LocalEngine(2).run(tasks(), OPTIONS):
         done.append(one)
         assert drawn <= len(done) + 1  # one is with each of the two workers
-    assert sorted(d.task.key for d in done) == sorted(str(k) for k in range(40))
-    assert {d.assessed.entry.status for d in done} == {Status.FAILED}
-    assert {d.assessed.entry.reason for d in done} == {"has no column OP"}
+    assert sorted(task.key for task, _ in done) == sorted(str(k) for k in range(40))
+    assert {found.entry.status for _, found in done} == {Status.FAILED}
+    assert {found.entry.reason for _, found in done} == {"has no column OP"}
 
 
 @pytest.mark.trial
 def test_killed_workers_are_replaced_and_no_loop_is_lost() -> None:
     engine = LocalEngine(2)
     keys, killed = [], 0
-    for done in engine.run(_tasks(30), OPTIONS):
-        keys.append(done.task.key)
-        assert done.assessed.entry.reason == "has no column OP"
+    for task, found in engine.run(_tasks(30), OPTIONS):
+        keys.append(task.key)
+        assert found.entry.reason == "has no column OP"
         if len(keys) in (1, 10):
             for process in multiprocessing.active_children():
                 process.kill()
@@ -72,7 +72,7 @@ def test_killed_workers_are_replaced_and_no_loop_is_lost() -> None:
 @pytest.mark.trial
 def test_a_loop_that_kills_its_workers_fails_alone() -> None:
     tasks = [_bad(_Then(os._exit, 9)), *_tasks(5)]
-    done = {d.task.key: d.assessed.entry for d in LocalEngine(1).run(tasks, OPTIONS)}
+    done = {task.key: found.entry for task, found in LocalEngine(1).run(tasks, OPTIONS)}
     assert len(done) == 6
     assert "worker ended 3 times" in done["bad"].reason
     assert done["4"].reason == "has no column OP"
@@ -82,7 +82,9 @@ def test_a_loop_that_kills_its_workers_fails_alone() -> None:
 def test_a_loop_that_takes_too_long_is_given_up() -> None:
     tasks = [_bad(_Then(time.sleep, 300.0)), *_tasks(2)]
     begun = time.monotonic()
-    done = {d.task.key: d.assessed.entry for d in LocalEngine(1, longest=1.5).run(tasks, OPTIONS)}
+    done = {
+        task.key: found.entry for task, found in LocalEngine(1, longest=1.5).run(tasks, OPTIONS)
+    }
     assert "more than 1.5 s" in done["bad"].reason
     assert done["1"].reason == "has no column OP"
     assert time.monotonic() - begun < 100.0
@@ -92,7 +94,7 @@ def test_a_loop_that_takes_too_long_is_given_up() -> None:
 def test_the_time_of_a_loop_begins_when_its_worker_is_ready() -> None:
     slow = dataclasses.replace(OPTIONS, read_by=_Then(time.sleep, 2.5))  # unpickled by the worker
     done = list(LocalEngine(1, longest=1.5).run(_tasks(3), slow))
-    assert {one.assessed.entry.reason for one in done} == {"has no column OP"}
+    assert {found.entry.reason for _, found in done} == {"has no column OP"}
     assert len(done) == 3
 
 
@@ -110,7 +112,7 @@ def test_where_no_worker_can_start_that_is_said_once() -> None:
 @pytest.mark.trial
 def test_a_loop_whose_worker_died_may_be_tried_again_and_one_that_was_judged_not() -> None:
     tasks = [*_tasks(1), _bad(_Then(os._exit, 9))]
-    again = {done.task.key: done.again for done in LocalEngine(1).run(tasks, OPTIONS)}
+    again = {task.key: found.again for task, found in LocalEngine(1).run(tasks, OPTIONS)}
     assert again == {"0": False, "bad": True}
 
 

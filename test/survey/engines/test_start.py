@@ -14,8 +14,8 @@ from stiction_ros.survey.engines.engine import Task
 from stiction_ros.survey.engines.local import LocalEngine
 from stiction_ros.survey.entry import SurveyOptions
 if __name__ == "__main__":
-    for done in LocalEngine(1).run([Task("1", unreadable(1))], SurveyOptions(pages=False)):
-        print(done.assessed.entry.reason)
+    for _, found in LocalEngine(1).run([Task("1", unreadable(1))], SurveyOptions(pages=False)):
+        print(found.entry.reason)
 """
 
 
