@@ -18,7 +18,7 @@ from stiction_ros.errors import InputError, storing
 if TYPE_CHECKING:
     from stiction_ros.online.session import Scenario
     from stiction_ros.online.unit import UnitScenario
-    from stiction_ros.report.run.report import RunReport
+    from stiction_ros.report.run.story import Story
 
 
 OPCUA = "opcua"
@@ -95,6 +95,7 @@ def _run_scenario(
     from stiction_ros.online.session import Scenario
     from stiction_ros.records.run.log import read_run
     from stiction_ros.report.run.report import report_run
+    from stiction_ros.report.run.story import tell
 
     name = scenario.name
     nodes = loop_nodes(scenario.path, directory, seed=options.seed, speed=options.speed)
@@ -114,11 +115,12 @@ def _run_scenario(
     show(0.92, f"{name}: reporting")
     if not isinstance(scenario, Scenario):
         return _report_unit(scenario, directory, seconds)
-    log = read_run(directory / "bag")
-    report = report_run(log, directory, scenario=scenario, seconds=seconds, load=load)
+    story = tell(read_run(directory / "bag"), scenario=scenario)
+    page, summary = report_run(story, directory, seconds, load)
     show(1.0)
-    _print(report)
-    return bool(report.summary["status"] == "ok")
+    _print(story, summary)
+    print(page)
+    return bool(summary["status"] == "ok")
 
 
 def _report_unit(scenario: "UnitScenario", directory: Path, seconds: float) -> bool:
@@ -135,10 +137,12 @@ def _report_unit(scenario: "UnitScenario", directory: Path, seconds: float) -> b
     return report.status == "ok"
 
 
-def _print(report: "RunReport") -> None:
+def _print(story: "Story", summary: dict[str, Any]) -> None:
     """Print what the page says first, and what is wrong with the run."""
-    name, summary = report.summary["scenario"], report.summary
-    for line in report.lines:
+    from stiction_ros.report.run.report import findings, headline
+
+    name = story.name
+    for line in (headline(story), *findings(story)):
         print(f"{name}: {line}")
     if summary["pv_to_op_ms"]:
         times = ", ".join(f"{key} {value:.3g}" for key, value in summary["pv_to_op_ms"].items())
@@ -150,7 +154,6 @@ def _print(report: "RunReport") -> None:
             print(f"{name}: warning: {lost} messages of {topic} are not in the bag")
     if summary["status"] != "ok":
         print(f"{name}: {summary['reason']}")
-    print(report.page)
 
 
 def _make_empty(directory: Path) -> None:

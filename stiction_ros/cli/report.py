@@ -41,9 +41,10 @@ def run(options: argparse.Namespace) -> int:
         if is_bag(options.record) and holds_live_run(options.record):
             from stiction_ros.records.run.log import read_run
             from stiction_ros.report.run.report import report_run
+            from stiction_ros.report.run.story import tell
 
             log = read_run(options.record, namespace=options.namespace)
-            print(report_run(log, out).page)
+            print(report_run(tell(log), out)[0])
         else:
             loop = intake.opened(options)
             intake.tell(loop)

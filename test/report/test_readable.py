@@ -14,6 +14,7 @@ from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.gap_page import report_gap
 from stiction_ros.report.record_page import report_record
 from stiction_ros.report.run.report import report_run
+from stiction_ros.report.run.story import tell
 
 LOOKS = [
     pytest.param(390, True, id="phone-dark"),
@@ -37,7 +38,7 @@ def test_the_report_of_a_record_is_readable(tmp_path: Path, width: int, dark: bo
 def test_the_report_of_a_run_is_readable(
     log: RunLog, tmp_path: Path, width: int, dark: bool
 ) -> None:
-    page = report_run(log, tmp_path / "report.html").page
+    page = report_run(tell(log), tmp_path / "report.html")[0]
     check(probe(page, width, dark=dark), width, dark=dark)
 
 

@@ -37,21 +37,18 @@ def outside(page: str) -> list[str]:
 
 
 def test_the_report_of_a_run(log: RunLog, tmp_path: Path) -> None:
-    written = report_run(log, tmp_path / "new" / "folder")
-    page = written.page.read_text(encoding="utf-8")
+    file, figures = report_run(tell(log), tmp_path / "new" / "folder")
+    page = file.read_text(encoding="utf-8")
     assert outside(page) == []
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
     assert "Valve V1 sticks; the swap ended the limit cycle" in page
     assert "After 500 s the controller changed from unaware to embedding" in page
     assert "5.10 % (4.98\u00a0…\u00a05.22)" in page
     for key in ("amplitude", "offset", "iae_per_hour"):
-        assert number(written.summary["phases"]["before"]["PV1"][key]) in page
+        assert number(figures["phases"]["before"]["PV1"][key]) in page
     assert "a note &lt;of&gt; the reader" in page
     assert "f_s: 5.0" in page
-    assert sorted(path.name for path in written.page.parent.iterdir()) == [
-        "report.html",
-        "summary.json",
-    ]
+    assert sorted(path.name for path in file.parent.iterdir()) == ["report.html", "summary.json"]
     for title in FIGURES:
         assert f"<h2>{title}</h2>" in page
     assert "The dashed line is the swap. Shaded: mode embedding." in page
@@ -59,13 +56,13 @@ def test_the_report_of_a_run(log: RunLog, tmp_path: Path) -> None:
 
 @pytest.mark.trial
 def test_one_page_alone(log: RunLog, tmp_path: Path) -> None:
-    written = report_run(log, tmp_path / "only.html")
+    file, _ = report_run(tell(log), tmp_path / "only.html")
     assert [path.name for path in tmp_path.iterdir()] == ["only.html"]
-    assert written.page.name == "only.html"
+    assert file.name == "only.html"
 
 
 def test_healthy_valves_are_no_trouble(healthy: RunLog, tmp_path: Path) -> None:
-    page = report_run(healthy, tmp_path).page.read_text(encoding="utf-8")
+    page = report_run(tell(healthy), tmp_path)[0].read_text(encoding="utf-8")
     assert "Valve V1 is healthy" in page
     assert 'class="warn"' not in page
     assert "The controller stayed unaware throughout." in page
@@ -74,16 +71,15 @@ def test_healthy_valves_are_no_trouble(healthy: RunLog, tmp_path: Path) -> None:
 def test_a_bag_with_nothing_but_the_signals(log: RunLog, tmp_path: Path) -> None:
     record = dataclasses.replace(log.record, sp=None, stem=None)
     bare = RunLog(record, log.start, (), (), (), {"/pv": 1200}, {})
-    written = report_run(bare, tmp_path)
-    assert "No fit of the valves" in written.page.read_text(encoding="utf-8")
-    page = written.page.read_text(encoding="utf-8")
+    page = report_run(tell(bare), tmp_path)[0].read_text(encoding="utf-8")
+    assert "No fit of the valves" in page
     assert [title for title in FIGURES if title in page] == ["The whole run"]
 
 
 @pytest.mark.trial
 def test_a_sticky_valve_without_a_comparison_is_a_warning(log: RunLog, tmp_path: Path) -> None:
     quiet = dataclasses.replace(log.record, pv=log.record.sp)
-    page = report_run(dataclasses.replace(log, record=quiet), tmp_path).page
+    page = report_run(tell(dataclasses.replace(log, record=quiet)), tmp_path)[0]
     assert "the loop did not cycle" in page.read_text(encoding="utf-8")
 
 

@@ -1,11 +1,9 @@
 """``report.html`` of a run: what was wrong, what the swap gained, then the evidence."""
 
-import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.online.session import Scenario
 from stiction_ros.pages.frame import framed, listed, text, words
 from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.events import ModeChange
@@ -14,7 +12,7 @@ from stiction_ros.report.page import Cell, folded, number, percent, table, write
 from stiction_ros.report.run import identified
 from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.scoring import PhaseStatus
-from stiction_ros.report.run.story import Story, tell
+from stiction_ros.report.run.story import Story
 from stiction_ros.report.run.summary import summary
 from stiction_ros.texts import moment, spoken
 
@@ -266,29 +264,13 @@ def _growth(look: Mapping[str, Any]) -> str:
     return f"{number(share)} ({number(limit)})"
 
 
-@dataclasses.dataclass(frozen=True)
-class RunReport:
-    """What was written: ``summary.json`` and the page, and the lines with which it begins."""
-
-    summary: dict[str, Any]
-    page: Path
-    lines: tuple[str, ...]
-
-
 def report_run(
-    log: RunLog,
-    out: str | Path,
-    *,
-    scenario: Scenario | None = None,
-    seconds: float | None = None,
-    load: float | None = None,
-) -> RunReport:
-    """Write ``summary.json`` and ``report.html`` of a live loop into a folder, or the page alone.
+    story: Story, out: str | Path, seconds: float | None = None, load: float | None = None
+) -> tuple[Path, dict[str, Any]]:
+    """Write ``report.html`` and ``summary.json`` of a run into a folder, or the page alone.
 
-    The ``scenario`` that was run serves to compare with a loop without friction. Wall time in
-    seconds, and the load of the machine before, are told where they are known.
+    Returned are the page and the mapping of the summary. Wall time in seconds, and the load of the
+    machine before, are told where they are known.
     """
-    story = tell(log, scenario=scenario)
     figures = summary(story, seconds, load)
-    page = write_page(out, run_page(story), figures)
-    return RunReport(figures, page, (headline(story), *findings(story)))
+    return write_page(out, run_page(story), figures), figures

@@ -6,6 +6,7 @@ import pytest
 from stiction_ros.records.run.events import GapLog
 from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.run.report import monitor_section, report_run
+from stiction_ros.report.run.story import tell
 
 SECOND = 10**9
 
@@ -37,5 +38,5 @@ def test_every_measurement_is_told_with_what_was_found(log: RunLog) -> None:
 
 @pytest.mark.trial
 def test_the_report_of_a_run_holds_it(log: RunLog, tmp_path: Path) -> None:
-    page = report_run(told(log), tmp_path / "run.html").page.read_text(encoding="utf-8")
+    page = report_run(tell(told(log)), tmp_path / "run.html")[0].read_text(encoding="utf-8")
     assert "<h2>The monitor</h2>" in page
