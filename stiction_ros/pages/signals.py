@@ -3,7 +3,7 @@
 import dataclasses
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from stiction_ros.effects.behaviour import FloatArray
@@ -39,16 +39,8 @@ class Units:
         return html.replace(UNITS.pv, self.pv)
 
 
-@dataclasses.dataclass(frozen=True)
-class View:
-    """What of a record is drawn: its rows, vertical lines and shaded stretches, s."""
-
-    rows: slice = dataclasses.field(default_factory=lambda: slice(None))
-    marks: tuple[float, ...] = ()
-    shade: tuple[tuple[float, float], ...] = ()
-
-
 UNITS: Units = Units()
+ALL = slice(None)  # rows of a whole record
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,10 +132,16 @@ def all_signals(record: Record, stem: FloatArray | None, units: Units) -> str:
 
 
 def over_record(
-    record: Record, stem: FloatArray | None, units: Units, view: View = View()
+    record: Record,
+    stem: FloatArray | None,
+    units: Units,
+    rows: slice = ALL,
+    *,
+    marks: Sequence[float] = (),
+    shade: Sequence[tuple[float, float]] = (),
 ) -> list[str]:
-    """Return a figure of each PV and then of each OP, as :func:`all_signals`, of the ``view``."""
-    rows, time = view.rows, record.time[view.rows]
+    """Return a figure of each PV and then of each OP over some ``rows``, as :func:`over_time`."""
+    time = record.time[rows]
     known = stem is not None or record.stem is not None
     drawn = [
         (
@@ -162,7 +160,7 @@ def over_record(
         for j, name in enumerate(record.valves)
     ]
     return [
-        over_time(title, time, curves, axis, record.start, view.shade, marks=view.marks)
+        over_time(title, time, curves, axis, record.start, shade, marks=marks)
         for title, curves, axis in drawn
     ]
 

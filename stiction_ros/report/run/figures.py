@@ -7,7 +7,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.pages.frame import text, words
 from stiction_ros.pages.plot import Curve, over_time
-from stiction_ros.pages.signals import Units, View, over_record
+from stiction_ros.pages.signals import ALL, Units, over_record
 from stiction_ros.records.record import Quality
 from stiction_ros.report.run.identified import responses
 from stiction_ros.report.run.scoring import errors
@@ -67,7 +67,7 @@ def end_of_cycle(story: Story) -> str:
 
 def whole_run(story: Story) -> str:
     """Return all signals over the whole run."""
-    return f"<h2>The whole run</h2>{_signals(story, slice(None))}"
+    return f"<h2>The whole run</h2>{_signals(story, ALL)}"
 
 
 def estimates(story: Story) -> str:
@@ -121,11 +121,12 @@ def step_responses(story: Story) -> str:
 
 
 def _signals(story: Story, rows: slice) -> str:
-    view = View(rows, _swaps(story), _aware(story))
-    known = " The dashed line is the swap." if view.marks else ""
+    marks, shade = _swaps(story), _aware(story)
+    known = " The dashed line is the swap." if marks else ""
     modes = dict.fromkeys(one.mode for one in story.log.modes if one.mode != "unaware")
-    shaded = f" Shaded: mode {text(' or '.join(modes))}." if view.shade else ""
-    drawn = over_record(story.record, story.log.stem_estimate, _units(story), view)
+    shaded = f" Shaded: mode {text(' or '.join(modes))}." if shade else ""
+    stem, units = story.log.stem_estimate, _units(story)
+    drawn = over_record(story.record, stem, units, rows, marks=marks, shade=shade)
     return f"<p>{known}{shaded}</p>{''.join(drawn)}"
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import SCRIPT
-from stiction_ros.pages.signals import UNITS, View, over_record
+from stiction_ros.pages.signals import UNITS, over_record
 from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.run.log import RunLog, read_run
 from stiction_ros.report.page import number, table, write_page
@@ -185,7 +185,7 @@ def _page(log: RunLog, summary: Mapping[str, Any], transfers: Sequence[Transfer]
             "<p>Where it is shaded OP is written under the operator's grant; else the plant's own "
             "PIs have the valves. The dashed line is the swap to a controller that knows of the "
             "friction.</p>",
-            *over_record(record, None, UNITS, View(marks=swap, shade=tuple(remote))),
+            *over_record(record, None, UNITS, marks=swap, shade=tuple(remote)),
             "<h2>The handshake</h2>",
             table(("time", "grant", "reason"), told, 3),
         ],
