@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from stiction_ros.pages.frame import text
 from stiction_ros.pages.plot import spark
-from stiction_ros.survey.entry import Entry, Status
+from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.listing.headline import (
     HEADS,
     Earlier,
@@ -24,8 +24,6 @@ from stiction_ros.texts import probability, spoken
 Cell = tuple[str, object]  # HTML, and what it is sorted by; None stands last
 
 COST = "cost per hour"
-REASON = "why not judged"
-NO_CYCLE = "The loop does not cycle."
 SAVED = {
     "service": "change of the mean |PV − SP| by a service of the valve, simulated: −75 % leaves a "
     "quarter of it",
@@ -42,26 +40,16 @@ class Column(NamedTuple):
     kind: str  # classes of its cells
     hint: str  # what its heading means
     cell: Callable[[Entry], Cell]  # of a loop; empty HTML where there is nothing to say
-    none: str = ""  # why it is empty of a loop that was judged; else as there is no friction
 
     def shown(self, entry: Entry) -> tuple[str, str]:
-        """Return what the column shows of a loop, and what it is sorted by."""
+        """Return what the column shows of a loop, a dash for nothing, and what it is sorted by."""
         found, value = self.cell(entry)
         plain = "" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)
-        return found or self._dash(entry), plain
+        return found or "–", plain
 
     def words(self, entry: Entry) -> str:
         """Return what the column tells of a loop in plain words; nothing where it is empty."""
         return html.unescape(re.sub("<[^>]*>", "", self.cell(entry)[0]))
-
-    def _dash(self, entry: Entry) -> str:
-        """Return an empty cell, which says why it is empty."""
-        healthy = entry.verdict == "healthy"
-        why = "The valve is healthy." if healthy else "It is not decided whether the valve sticks."
-        why = self.none or why
-        if entry.status is not Status.OK and self.head != REASON:
-            why = "The loop was not judged."
-        return f'<span role="img" aria-label="{why}" title="{why}">–</span>'
 
 
 def columns_of(entries: Sequence[Entry], earlier: Sequence[Earlier]) -> list[Column]:
@@ -76,7 +64,6 @@ def columns_of(entries: Sequence[Entry], earlier: Sequence[Earlier]) -> list[Col
         Column(
             *("cycles by", "t", "what makes the loop cycle"),
             lambda entry: (text(say.cause_words(entry.cause)), say.cause_words(entry.cause)),
-            "It was not found what makes the loop cycle.",
         ),
         Column(
             *("OP lost", "s"),
@@ -91,16 +78,15 @@ def columns_of(entries: Sequence[Entry], earlier: Sequence[Earlier]) -> list[Col
         Column(
             *("probability", "", "of friction in the valve"),
             lambda entry: (probability(entry.probability), entry.probability),
-            "This method computes no probability.",
         ),
         Column(
             *("worth a test", "s"),
             "what a test in manual would take, where the record does not decide: its time, and how "
             "far PV is expected to move (stiction valve-test plan)",
-            *(_test, "No test is needed."),
+            _test,
         ),
-        Column("period", "s", "of the cycle of PV − SP", _period, NO_CYCLE),
-        Column("amplitude, PV units", "", "of the cycle of PV − SP", _amplitude, NO_CYCLE),
+        Column("period", "s", "of the cycle of PV − SP", _period),
+        Column("amplitude, PV units", "", "of the cycle of PV − SP", _amplitude),
     ]
     if any(entry.gain for entry in entries):
         for what, head in HEADS.items():
@@ -110,7 +96,6 @@ def columns_of(entries: Sequence[Entry], earlier: Sequence[Earlier]) -> list[Col
             Column(
                 *(COST, "", "what the cycle costs in an hour"),
                 lambda entry: (say.figure(entry.cost_per_hour), entry.cost_per_hour),
-                "No cost was given for this loop.",
             )
         )
     if earlier:
@@ -118,7 +103,7 @@ def columns_of(entries: Sequence[Entry], earlier: Sequence[Earlier]) -> list[Col
             Column(
                 *("friction before and now", "trend"),
                 "f_S + f_D in the first survey and now; lines are drawn from 0 to the widest band",
-                *(_trends(entries, earlier), "No earlier survey has this loop."),
+                _trends(entries, earlier),
             )
         )
     return [
@@ -126,12 +111,10 @@ def columns_of(entries: Sequence[Entry], earlier: Sequence[Earlier]) -> list[Col
         Column(
             *("group", "up", "loops with the same number cycle together"),
             lambda entry: (text(entry.group or ""), entry.group),
-            "The loop cycles with no other loop.",
         ),
         Column(
-            *(REASON, "t wordy", "the reason, and what to do about it"),
+            *("why not judged", "t wordy", "the reason, and what to do about it"),
             lambda entry: (text(entry.reason), entry.reason),
-            "The loop was judged.",
         ),
     ]
 

@@ -77,7 +77,7 @@ def _table(entries: Sequence[Entry], columns: Sequence[Column]) -> str:
             shown, value = column.shown(entry)
             said = text(column.head.replace("_S", "ₛ"))
             tag = 'th scope="row"' if column.head == "loop" else f'td data-label="{said}"'
-            kind = column.kind + " none" * shown.endswith(">–</span>")
+            kind = column.kind + " none" * (shown == "–")
             cells.append(f'<{tag} class="{kind}" data-value="{text(value)}">{shown}</{tag[:2]}>')
         rows.append(
             f'<tr data-kind="{text(kind_of(entry))}" data-cause="{text(entry.cause or "")}">'
@@ -126,6 +126,5 @@ def _legend(columns: Sequence[Column]) -> str:
         "<h2>How to read it</h2><p>Valves that stick or have backlash and make their loop cycle "
         "come first; at the top stand the surest whose friction makes most of the loop's "
         "movement. Undecided valves follow in the order of their probability of friction."
-        f"{money} The page of a loop has all figures with their intervals. A dash says on "
-        f"pointing why a cell is empty.</p><dl>{hints}</dl>"
+        f"{money} The page of a loop has all figures with their intervals.</p><dl>{hints}</dl>"
     )
