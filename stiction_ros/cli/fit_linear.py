@@ -73,7 +73,7 @@ def _print(read: str, found: "LinearIdentification") -> None:
     """Print what was read of the record, then the model that was found."""
     print(read)
     console = Console()
-    title = f"state space, {found.samples} samples, {found.status}"
+    title = f"state space of order {found.order}, {found.samples} samples, {found.status}"
     table = Table(title=title, title_justify="left")
     heads = ["output", "delay", "one step %", "free run %", "noise"]
     heads += [f"gain {valve}" for valve in found.valves]
@@ -89,28 +89,9 @@ def _print(read: str, found: "LinearIdentification") -> None:
             *(f"{gain:.5g}" for gain in found.gain[i]),
         )
     console.print(table)
-    console.print("poles: " + ", ".join(_number(pole) for pole in found.poles))
-    console.print(_rivals(found))
     for note in [found.reason, *found.notes]:
         if note:
             console.print(f"note: {note}")
-
-
-def _number(value: complex) -> str:
-    if abs(value.imag) < 1e-9:
-        return f"{value.real:.4f}"
-    return f"{value.real:.4f}{value.imag:+.4f}j"
-
-
-def _rivals(found: "LinearIdentification") -> Table:
-    """Return the table of the orders that were tried; the one taken is marked."""
-    heads = ["order", "AIC", "BIC", "one step %", "free run %", "taken"]
-    table = Table(*heads, title="orders, AIC and BIC of the one-step error", title_justify="left")
-    for rival in found.rivals:
-        figures = [f"{rival.aic:.1f}", f"{rival.bic:.1f}"]
-        figures += [f"{fit.mean():.2f}" for fit in (rival.fit_one_step, rival.fit_free_run)]
-        table.add_row(str(rival.order), *figures, "yes" if rival.order == found.order else "")
-    return table
 
 
 def limits_range(text: str) -> tuple[float, float]:
