@@ -1,4 +1,4 @@
-"""``stiction certificates``: make our own, pin that of a server, show one."""
+"""``stiction certificates``: make our own, pin that of a server."""
 
 import argparse
 import asyncio
@@ -17,7 +17,7 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "certificates",
-        description="Make our certificate and key, pin the certificate of a server, show one.",
+        description="Make our certificate and key, pin the certificate of a server.",
     )
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
     make = actions.add_parser("make", help="make a self-signed certificate and its key")
@@ -46,9 +46,6 @@ def add(commands: Any) -> None:
     pin.add_argument("--to", metavar="FILE", help="file to save, DER")
     pin.add_argument("--fingerprint", help="SHA-256, pairs of hexadecimal digits")
     pin.set_defaults(run=_pin)
-    show = actions.add_parser("show", help="show a certificate")
-    show.add_argument("file", help="the certificate, DER")
-    show.set_defaults(run=_show)
 
 
 def _make(options: argparse.Namespace) -> int:
@@ -97,14 +94,6 @@ def _pin(options: argparse.Namespace) -> int:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(found.public_bytes(Encoding.DER))
     print(f"pinned: {options.to}")
-    return 0
-
-
-def _show(options: argparse.Namespace) -> int:
-    from stiction_ros.opcua.security import load_certificate
-
-    require_asyncua()
-    _describe(load_certificate(Path(options.file)))
     return 0
 
 

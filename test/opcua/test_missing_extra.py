@@ -12,7 +12,6 @@ URL = "opc.tcp://127.0.0.1:1"
 CALLS = (
     ["demo", "opcua", "--out", "{}/out"],
     ["certificates", "make", "--out", "{}/own"],
-    ["certificates", "show", "{}/own.der"],
     ["certificates", "pin", URL],
     ["browse-tags", URL, "--sample-time", "1", "--out", "{}/x.tags.yaml"],
     ["fetch-history", URL, "--tags", "x", "--from", "2026-01-01", "--to", "2026-01-02"],
