@@ -1,7 +1,6 @@
 """``stiction demo``: a live loop from limit cycle to compensation, recorded and reported."""
 
 import argparse
-import os
 import shutil
 import signal
 import sys
@@ -100,7 +99,7 @@ def _run_scenario(
     name = scenario.name
     nodes = loop_nodes(scenario.path, directory, seed=options.seed, speed=options.speed)
     processes = NodeProcesses(nodes, directory)
-    load, begin = os.getloadavg()[0], time.monotonic()
+    begin = time.monotonic()
     try:
         try:
             processes.start()
@@ -116,7 +115,7 @@ def _run_scenario(
     if not isinstance(scenario, Scenario):
         return _report_unit(scenario, directory, seconds)
     story = tell(read_run(directory / "bag"), scenario=scenario)
-    page, summary = report_run(story, directory, seconds, load)
+    page, summary = report_run(story, directory, seconds)
     show(1.0)
     _print(story, summary)
     print(page)
@@ -146,8 +145,7 @@ def _print(story: "Story", summary: dict[str, Any]) -> None:
         print(f"{name}: {line}")
     if summary["pv_to_op_ms"]:
         times = ", ".join(f"{key} {value:.3g}" for key, value in summary["pv_to_op_ms"].items())
-        load = f"load {summary['load_before']:.2f} before the run"
-        print(f"{name}: PV to OP in ms: {times}; {load}")
+        print(f"{name}: PV to OP in ms: {times}")
     for topic, count in summary["messages"].items():
         lost = (count["published"] or 0) - count["recorded"]
         if lost > 0:

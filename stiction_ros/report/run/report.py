@@ -265,12 +265,11 @@ def _growth(look: Mapping[str, Any]) -> str:
 
 
 def report_run(
-    story: Story, out: str | Path, seconds: float | None = None, load: float | None = None
+    story: Story, out: str | Path, seconds: float | None = None
 ) -> tuple[Path, dict[str, Any]]:
     """Write ``report.html`` and ``summary.json`` of a run into a folder, or the page alone.
 
-    Returned are the page and the mapping of the summary. Wall time in seconds, and the load of the
-    machine before, are told where they are known.
+    Returned are the page and the mapping of the summary, with the wall time where it is known.
     """
-    figures = summary(story, seconds, load)
+    figures = summary(story, seconds)
     return write_page(out, run_page(story), figures), figures

@@ -9,9 +9,7 @@ from stiction_ros.report.run.story import Story
 from stiction_ros.texts import finite
 
 
-def summary(
-    story: Story, seconds: float | None = None, load: float | None = None
-) -> dict[str, Any]:
+def summary(story: Story, seconds: float | None = None) -> dict[str, Any]:
     """Return the mapping of ``summary.json``; numbers that do not exist are null.
 
     Without the wall time in ``seconds`` it is that between first and last publication in the bag.
@@ -27,7 +25,6 @@ def summary(
         "samples": len(record),
         "sample_time": record.sample_time,
         "seconds": seconds,
-        "load_before": load,
         "samples_per_second": len(record) / seconds if seconds > 0 else None,
         "swap_time": story.swap_time,
         "delay": {o["name"]: dict(o["delay"]) for o in story.identified.get("outputs", [])},
