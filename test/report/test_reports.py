@@ -22,7 +22,6 @@ from stiction_ros.report.run.report import headline, report_run
 from stiction_ros.report.run.story import tell
 
 FIGURES = (
-    "The same set-point moves before and after",
     "The end of the limit cycle",
     "The whole run",
     "Friction found over time",

@@ -1,4 +1,4 @@
-"""The figures of a run: before and after, signals, estimates, step responses."""
+"""The figures of a run: signals around the swap and of all, estimates, step responses."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,48 +8,14 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.pages.frame import text, words
 from stiction_ros.pages.plot import Curve, over_time
 from stiction_ros.pages.signals import ALL, Units, over_record
-from stiction_ros.records.record import Quality
 from stiction_ros.report.run.identified import responses
-from stiction_ros.report.run.scoring import errors
 from stiction_ros.report.run.story import Story
 
 
 def draw_run(story: Story) -> list[str]:
     """Return every section of figures that the run has data for, HTML."""
-    drawers = (rounds, end_of_cycle, whole_run, estimates, step_responses)
+    drawers = (end_of_cycle, whole_run, estimates, step_responses)
     return [drawer(story) for drawer in drawers]
-
-
-def rounds(story: Story) -> str:
-    """Return the error over one round of set-points: before, after, without friction."""
-    before, after, length = story.phases.before, story.phases.after, story.round_samples
-    if before is None or after is None or length is None:
-        return ""
-    record = story.record
-    error, _ = errors(record)
-    error[record.quality == Quality.BAD] = np.nan  # a gap stays empty
-    parts = [
-        ("before the swap", "op", error[before.first : before.last]),
-        ("after the swap", "pv", error[after.first : after.last]),
-    ]
-    if story.free_record is not None:
-        free, _ = errors(story.free_record)
-        parts.insert(1, ("without friction", "whole", free[after.first : after.last]))
-    drawn = []
-    for j, name in enumerate(record.outputs):
-        # Set-point moves make errors far larger than the cycle: they may leave the figure.
-        reach = 1.3 * float(np.nanquantile(np.abs(parts[0][2][:, j]), 0.96)) or 1.0
-        drawn.append(
-            over_time(
-                f"PV − SP of {name} over one round of set-points. Spikes at set-point moves are "
-                "cut off.",
-                record.time[:length],
-                [Curve(label, kind, values[:, j]) for label, kind, values in parts],
-                f"PV − SP of {_units(story).axis(name)}",
-                limits=(-reach, reach),
-            )
-        )
-    return f"<h2>The same set-point moves before and after</h2>{''.join(drawn)}"
 
 
 def end_of_cycle(story: Story) -> str:

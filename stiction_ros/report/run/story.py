@@ -26,7 +26,6 @@ class Story:
     log: RunLog  # what the bag holds
     phases: Phases  # before and after the swap
     stiction_free: Phase | None  # the same moves with ideal valves, None when not simulated
-    free_record: Record | None  # record of that run
     truth: LoopModel | None  # the loop that the plant node simulated; None for a real plant
     seed: int | None  # of the plant's noise, None when unknown
     round_samples: int | None  # samples of one round of set-points, None when they do not repeat
@@ -77,19 +76,17 @@ def tell(log: RunLog, *, scenario: Scenario | None = None, name: str | None = No
         sigma = truth.process.noise_std(NoiseEntry.MEASUREMENT).tolist()
     repeat = round_of(log, scenario)
     found = phases(record, log.swap_sample, repeat, sigma)
-    free = free_phase = None
+    free = None
     if scenario is not None and found.after is not None:
         last = found.after.last
         run = run_live(scenario, seed=seed, samples=last, ideal_valves=True, identify=False)
-        free = run.run.record
         period = None if found.cycle is None else found.cycle.period
-        free_phase = score(free, found.after.first, last, period, sigma)
+        free = score(run.run.record, found.after.first, last, period, sigma)
     tank = truth is not None and truth.process.kind == "stirred_tank"
     return Story(
         name or (record.name if scenario is None else scenario.name),
         log,
         found,
-        free_phase,
         free,
         truth,
         seed,
