@@ -1,4 +1,8 @@
-const CALENDAR = STEPS, views = new Map();
+const HOUR = 3600, DAY = 86400, views = new Map();
+// steps between two dates on an axis, s
+const CALENDAR = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800,
+  1 * HOUR, 2 * HOUR, 3 * HOUR, 6 * HOUR, 12 * HOUR,
+  1 * DAY, 2 * DAY, 7 * DAY, 14 * DAY, 28 * DAY, 91 * DAY, 182 * DAY, 364 * DAY];
 const show = (view, a, b) => {
   const least = (view.high - view.low) / 500, span = Math.max(b - a, least);
   view.a = Math.max(view.low, Math.min(a, view.high - span));
@@ -55,7 +59,7 @@ for (const figure of document.querySelectorAll("figure.plot[data-low]")) {
   const view = views.get(key), whole = area.getAttribute("viewBox").split(" ").map(Number);
   const axis = svg.querySelector("g.x"), dated = "dated" in figure.dataset;
   let from = null;
-  view.drawn.push(() => {
+  const draw = () => {
     const { a, b, low, high } = view, scale = whole[2] / (high - low);
     area.setAttribute("viewBox",
       [(a - low) * scale, whole[1], (b - a) * scale, whole[3]].join(" "));
@@ -68,7 +72,9 @@ for (const figure of document.querySelectorAll("figure.plot[data-low]")) {
       tick.textContent = label;
       axis.append(tick);
     }
-  });
+  };
+  view.drawn.push(draw);
+  draw();
   const at = event => {
     const box = area.getBoundingClientRect();
     const share = (event.clientX - box.left) / box.width;

@@ -13,7 +13,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.intake.tables.clock import DATED
 from stiction_ros.pages.frame import text, words
 from stiction_ros.signals.holds import stretches
-from stiction_ros.texts import DAY, HOUR
+from stiction_ros.texts import HOUR
 
 # units across the area of a figure over time, which is as wide as its page, and its height, px
 WIDE, TALL = 1000, 240
@@ -22,14 +22,8 @@ MOST = 3000  # points of a curve; of a longer one the lowest and highest of each
 ROOM = 0.04  # share of the range that is left free above and below
 KINDS = ("pv", "op", "stem", "free", "sp", "ink")  # colours of curves that are of one kind
 
-# steps between two dates on an axis, s
-CALENDAR = [
-    *(1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800),
-    *(round(HOUR * k) for k in (1, 2, 3, 6, 12)),
-    *(round(DAY * k) for k in (1, 2, 7, 14, 28, 91, 182, 364)),
-]
-_FILE = resources.files("stiction_ros.pages").joinpath("plot.js")
-SCRIPT = _FILE.read_text("utf-8").replace("STEPS", str(CALENDAR))
+SCRIPT = resources.files("stiction_ros.pages").joinpath("plot.js").read_text("utf-8")
+"""Writes the times below each figure over time, and zooms."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +47,7 @@ def over_time(
     marks: Sequence[float] = (),
     limits: tuple[float, float] | None = None,
 ) -> str:
-    """Return a figure of curves over one time, which the script of the page can zoom.
+    """Return a figure of curves over one time, whose axis the script of the page writes and zooms.
 
     Args:
         title: below the figure.
@@ -91,14 +85,6 @@ def over_time(
         grid.append(f'<line class="grid" x1="0" x2="100%" y1="{up:.1f}" y2="{up:.1f}"/>')
         labels.append(f'<text x="-6" y="{up + 4:.1f}" text-anchor="end">{_label(value)}</text>')
     short = {"hours": " h", "minutes": " min"}.get(unit, " s")
-    ticks = _dates(begin, end) if dated else [(at, _label(at)) for at in _ticks(begin, end, 8)]
-    if not dated and ticks:
-        ticks[0] = (ticks[0][0], ticks[0][1] + short)
-    across = "".join(
-        f'<text x="{100.0 * (value - begin) / (end - begin):.2f}%" y="{TALL + 18}" '
-        f'text-anchor="middle">{label}</text>'
-        for value, label in ticks
-    )
     told = f"Time from {_stamp(begin)} to {_stamp(end)}." if dated else f"Time in {unit}."
     return (
         f'<figure class="plot" data-low="{begin:.12g}" data-high="{end:.12g}" data-unit="{short}"'
@@ -107,7 +93,7 @@ def over_time(
         f'{"".join(grid)}<svg width="100%" height="{TALL}" viewBox="0 0 {WIDE} {TALL}" '
         f'preserveAspectRatio="none">{"".join(lines)}</svg>'
         f'<rect class="frame" width="100%" height="{TALL}"/>'
-        f'{"".join(labels)}<g class="x" data-y="{TALL + 18}">{across}</g></svg>'
+        f'{"".join(labels)}<g class="x" data-y="{TALL + 18}"></g></svg>'
         f"<figcaption>{words(title)} {told}</figcaption></figure>"
     )
 
@@ -177,20 +163,6 @@ def _unit(span: float) -> tuple[str, float]:
 def _stamp(seconds: float) -> str:
     shown = datetime.datetime.fromtimestamp(seconds, datetime.UTC)
     return f"{shown:%Y-%m-%d %H:%M}" if seconds % 60.0 == 0.0 else f"{shown:%Y-%m-%d %H:%M:%S}"
-
-
-def _dates(low: float, high: float) -> list[tuple[float, str]]:
-    """Return dates between two ends, s since 1970, at most eight, as the script writes them."""
-    steps = (step for step in CALENDAR if (high - low) / step <= 8)
-    step, found = next(steps, CALENDAR[-1]), list[tuple[float, str]]()
-    for k in range(math.ceil(low / step), math.floor(high / step) + 1):
-        shown = datetime.datetime.fromtimestamp(k * step, datetime.UTC)
-        day = f"{shown.day} {shown:%b}"
-        clock = f"{shown:%H:%M:%S}" if step % 60 else f"{shown:%H:%M}"
-        only_day = step % round(DAY) == 0 or k * step % round(DAY) == 0
-        label = day if only_day else clock if found else f"{day} {clock}"
-        found.append((float(k * step), label))
-    return found
 
 
 def spark(values: Sequence[float], most: float) -> str:

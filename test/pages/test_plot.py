@@ -1,15 +1,16 @@
 """Figures as SVG: their axes, and which curves they show."""
 
 import dataclasses
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import needs_browser, probe
 from made import identification, record
 
 from stiction_ros.errors import InputError
-from stiction_ros.pages.plot import MOST, Curve, over_time
+from stiction_ros.pages.frame import framed
+from stiction_ros.pages.plot import MOST, SCRIPT, Curve, over_time
 from stiction_ros.pages.signals import Units, all_signals, close_look, plot
 
 UNITS = Units("bar", "%")
@@ -17,24 +18,34 @@ MARCH = 1709330400.0
 """2024-03-01 22:00 UTC, s since 1970."""
 
 
-@pytest.mark.parametrize(
-    ("span", "start", "marks", "told"),
-    [
-        (90.0, 0.0, "0 s 20 40 60 80", "Time in seconds."),
-        (4000.0, 0.0, "0 min 10 20 30 40 50 60", "Time in minutes."),
-        (3600.0, MARCH, "1 Mar 22:00 22:10 22:20 22:30 22:40 22:50 23:00", "22:00 to 2024-03-01"),
-        (3e4, MARCH, "1 Mar 22:00 2 Mar 02:00 04:00 06:00", "from 2024-03-01 22:00 to 2024-03-02"),
-        (1e6, MARCH, "2 Mar 4 Mar 6 Mar 8 Mar 10 Mar 12 Mar", "to 2024-03-13 11:46:40."),
-    ],
-)
-def test_a_time_axis_bears_dates_where_the_record_has_them(
-    span: float, start: float, marks: str, told: str
-) -> None:
+AXES = [
+    (90.0, 0.0, "0 s 20 40 60 80", "Time in seconds."),
+    (4000.0, 0.0, "0 min 10 20 30 40 50 60", "Time in minutes."),
+    (3600.0, MARCH, "1 Mar 22:00 22:10 22:20 22:30 22:40 22:50 23:00", "22:00 to 2024-03-01"),
+    (3e4, MARCH, "1 Mar 22:00 2 Mar 02:00 04:00 06:00", "from 2024-03-01 22:00 to 2024-03-02"),
+    (1e6, MARCH, "2 Mar 4 Mar 6 Mar 8 Mar 10 Mar 12 Mar", "to 2024-03-13 11:46:40."),
+]
+
+
+def _drawn(span: float, start: float) -> str:
     time = np.linspace(0.0, span, 50)
-    made = over_time("A figure.", time, [Curve("PV", "pv", time)], "PV", start)
-    shown = re.findall(">([^<>]+)</text>", made.partition('class="x"')[2])
-    assert " ".join(shown) == marks
-    assert told in made
+    return over_time("A figure.", time, [Curve("PV", "pv", time)], "PV", start)
+
+
+def test_a_figure_over_time_says_its_dates_or_the_unit_of_its_time() -> None:
+    for span, start, _, told in AXES:
+        assert told in _drawn(span, start)
+
+
+@needs_browser
+def test_a_time_axis_bears_dates_where_the_record_has_them(tmp_path: Path) -> None:
+    page = tmp_path / "axes.html"
+    figures = [_drawn(span, start) for span, start, _, _ in AXES]
+    page.write_text(framed("Axes", figures, SCRIPT), encoding="utf-8")
+    act = """return [...document.querySelectorAll("g.x")].map(axis =>
+      [...axis.querySelectorAll("text")].map(tick => tick.textContent).join(" "));"""
+    shown = probe(page, 1400, dark=False, act=act)["acted"]
+    assert shown == [marks for _, _, marks, _ in AXES]
 
 
 def test_a_long_curve_keeps_its_peaks_and_its_gaps() -> None:
