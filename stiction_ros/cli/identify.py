@@ -33,6 +33,7 @@ def add(commands: Any) -> None:
     intake.add_record(parser)
     option(
         "--na",
+        dest="output_order",
         type=searches.output_orders,
         metavar="N[,N]",
         help="order n_a of the process (default: by BIC); methods of the paper take one order, "
@@ -40,6 +41,7 @@ def add(commands: Any) -> None:
     )
     option(
         "--nb",
+        dest="input_order",
         type=searches.input_orders,
         metavar="N[,N][/N,N]",
         help="order n_b of the process (default: n_a); methods of the paper take one order, or "
@@ -73,10 +75,9 @@ def run(options: argparse.Namespace) -> int:
     chosen = searches.search_options(options)
     from stiction_ros.identification import IdentificationOptions
 
-    plain = searches.refuse_channel_orders(options, chosen)
+    shared = {key: getattr(options, key) for key in searches.ORDERS if key not in chosen}
     settings = IdentificationOptions(
-        output_order=plain["na"],
-        input_order=plain["nb"],
+        **shared,
         delay=options.delay,
         law=options.law,
         kind=options.kind,

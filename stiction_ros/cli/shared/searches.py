@@ -23,12 +23,15 @@ METHODS = ("exact", "evidence", *PAPER_METHODS)
 CRITERIA = ("aic", "bic")
 SUBSPACE_METHODS = ("n4sid", "cva", "predictor")
 
-# Option: where its value goes, and the methods that have it.
+# Option: where its value goes, and the methods that have it; of orders one for each channel.
 OWNERS = {
+    "--na": ("output_order", PAPER_METHODS),
+    "--nb": ("input_order", PAPER_METHODS),
     "--friction-limit": ("friction_limit", ("exact", "evidence", *PAPER_METHODS)),
     "--starts": ("starts", ("nlp", "nlp_printed")),
     "--grid-step": ("grid_step", ("grid",)),
 }
+ORDERS = ("output_order", "input_order")
 
 
 def laws() -> tuple[str, ...]:
@@ -118,39 +121,20 @@ def input_orders(text: str) -> int | tuple[int | tuple[int, ...], ...]:
     return rows[0] if len(rows) == 1 and isinstance(rows[0], int) else rows
 
 
-def refuse_channel_orders(
-    options: argparse.Namespace, chosen: dict[str, Any]
-) -> dict[str, int | None]:
-    """Return the orders that all channels share; those per channel go to ``chosen``.
-
-    They are refused for a search that has one order for all channels.
-    """
-    plain: dict[str, int | None] = {}
-    for option, key in (("na", "output_order"), ("nb", "input_order")):
-        value = getattr(options, option)
-        plain[option] = value if value is None or isinstance(value, int) else None
-        if plain[option] == value:
-            continue
-        if options.method not in PAPER_METHODS:
-            raise InputError(
-                f"method {options.method} takes one order for all channels",
-                where=f"--{option}",
-                fix=f"add --method {' or '.join(PAPER_METHODS)}",
-            )
-        chosen[key] = value
-    return plain
-
-
 def search_options(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of single searches that were given; the method at hand must have them."""
+    """Return the options of single searches that were given; the method at hand must have them.
+
+    Orders are among them where they differ by channel.
+    """
     chosen: dict[str, Any] = {}
     for option, (key, methods) in OWNERS.items():
-        value = getattr(options, key)
-        if value is None:
+        value = getattr(options, key, None)
+        if value is None or (key in ORDERS and isinstance(value, int)):
             continue
         if options.method not in methods:
+            what = "order for each channel" if key in ORDERS else "such option"
             raise InputError(
-                f"method {options.method} has no such option",
+                f"method {options.method} has no {what}",
                 where=option,
                 fix=f"add --method {' or '.join(methods)}",
             )
