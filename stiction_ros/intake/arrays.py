@@ -130,8 +130,7 @@ def _record(
                 0,
             )
             sheet.name = name
-            way = FileWay(wanted)
-            blocks = blocks_of(sheet, plan_of(sheet, way), way)
+            blocks = blocks_of(plan_of(sheet, FileWay(wanted)))
             (own,) = blocks.values()
             loop = loop_of(Found(name, name, tuple(own), named=True), wanted)
             found = longest_part(loop.parts)

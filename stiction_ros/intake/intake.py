@@ -10,12 +10,12 @@ from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.assembly import Found, loop_of, unread
 from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions
 from stiction_ros.intake.loop import Loop, signals_of_records
-from stiction_ros.intake.sheets.sheet import SUFFIXES, Sheet, stem
+from stiction_ros.intake.sheets.sheet import SUFFIXES, stem
 from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.intake.tables.block import Block
 from stiction_ros.intake.tables.plan import Plan, plan_of
 from stiction_ros.intake.tables.reading import blocks_of
-from stiction_ros.intake.tables.tags import FileWay, TagList, read_tag_list
+from stiction_ros.intake.tables.tags import TagList, read_tag_list
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.loop_runs import read_bag_loops, read_bag_parts
@@ -56,7 +56,7 @@ def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:
 
 
 def _loops(files: Iterable[Path], options: IntakeOptions, tags: TagList) -> Iterator[Loop]:
-    tables: list[_Table] = []
+    tables: list[Plan] = []
     for file in files:
         told = Path(str(file).encode(errors="backslashreplace").decode())
         if told != file:  # no page and no list could hold it
@@ -82,13 +82,12 @@ def _loops(files: Iterable[Path], options: IntakeOptions, tags: TagList) -> Iter
             except InputError as error:
                 yield Loop(sheet.name, (file,), (), problem=str(error))
                 continue
-            table = _Table(sheet, plan, way)
             if plan.single:
-                yield from _read([table])
+                yield from _read([plan])
             else:
-                tables.append(table)
-    long = [table for table in tables if table.plan.long is not None]
-    wide = [table for table in tables if table.plan.long is None]
+                tables.append(plan)
+    long = [table for table in tables if table.long is not None]
+    wide = [table for table in tables if table.long is None]
     for group in (long, *_groups(wide)):
         yield from _read(group)
 
@@ -145,14 +144,7 @@ def is_bag(path: str | Path) -> bool:
     return one and all(f.suffix == ".mcap" and os.path.isfile(f) for f in inside)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Table:
-    sheet: Sheet
-    plan: Plan
-    way: FileWay
-
-
-_Signals = tuple[_Table, Block]  # signals of a loop, and the table that they stand in
+_Signals = tuple[Plan, Block]  # signals of a loop, and the table that they stand in
 
 
 def _files(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Path]:
@@ -219,35 +211,35 @@ def _with_names_of_their_own(found: Iterator[Loop]) -> Iterator[Loop]:
         yield loop if name == loop.name else dataclasses.replace(loop, name=name)
 
 
-def _groups(tables: Sequence[_Table]) -> list[list[_Table]]:
+def _groups(tables: Sequence[Plan]) -> list[list[Plan]]:
     """Return tables that have loops in common together, in the order of the first of each."""
-    groups: dict[int, list[_Table]] = {}
+    groups: dict[int, list[Plan]] = {}
     owner: dict[str, int] = {}
     for place, table in enumerate(tables):
-        first, *others = sorted({owner.get(name, place) for name in table.plan.loops})
+        first, *others = sorted({owner.get(name, place) for name in table.loops})
         joining = [*itertools.chain(*(groups.pop(other, []) for other in others)), table]
         groups.setdefault(first, []).extend(joining)
-        owner.update((name, first) for member in joining for name in member.plan.loops)
+        owner.update((name, first) for member in joining for name in member.loops)
     return list(groups.values())
 
 
-def _read(group: Sequence[_Table]) -> Iterator[Loop]:
+def _read(group: Sequence[Plan]) -> Iterator[Loop]:
     """Yield the loops of tables that belong together."""
     found: dict[str, list[_Signals]] = {}
     for table in group:
         path = table.sheet.path
         try:
             with foreign(path):
-                read = blocks_of(table.sheet, table.plan, table.way)
-                if not read and table.plan.long is not None:
+                read = blocks_of(table)
+                if not read and table.long is not None:
                     raise InputError(
                         "has no tag such as FIC101.PV or FIC101/OP in column "
-                        f"{table.sheet.layout.given[table.plan.long.tag]}",
+                        f"{table.sheet.layout.given[table.long.tag]}",
                         fix="say which belong together with --tags F, or name the columns with "
                         "--long TAG,TIME,VALUE",
                     )
         except InputError as error:
-            for name in table.plan.loops or [table.sheet.name]:
+            for name in table.loops or [table.sheet.name]:
                 yield Loop(name, (path,), (), problem=str(error))
             continue
         for name, blocks in read.items():
@@ -259,7 +251,7 @@ def _read(group: Sequence[_Table]) -> Iterator[Loop]:
 def _loop(name: str, read: Sequence[_Signals]) -> Loop:
     """Return a loop of tables, with its problem where it cannot be made into records."""
     tables, blocks = zip(*read, strict=True)
-    single, named = tables[0].plan.single, all(table.plan.named for table in tables)
+    single, named = tables[0].single, all(table.named for table in tables)
     found = Found(name, blocks[0].path.name if single else name, blocks, named, not single)
     try:
         with foreign(found.files[0]):

@@ -108,8 +108,10 @@ def _first(sheet: Sheet, names: tuple[str, ...]) -> int | None:
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Which column is what."""
+    """Which column of a table is what."""
 
+    sheet: Sheet  # the table
+    way: FileWay  # how its file is read
     single: bool  # whether the table holds one loop, whose signals have names of no loop
     time: TimeColumn  # column of the times; its place is -1 where rows are a sample time apart
     loops: Mapping[str, Mapping[Key, int]]  # loop to its signals' columns; empty for a long table
@@ -128,21 +130,22 @@ def plan_of(sheet: Sheet, way: FileWay) -> Plan:
     top = next((columns for columns, _ in sheet.pieces(LOOKED_AT)), empty)
     options = way.options
     if options.long is None and (options.columns.op or options.columns.pv):
-        return _one_loop(sheet, options, top)
+        return _one_loop(sheet, way, top)
     long = one_value(sheet, way, top)
     if long is not None:
         taken = {long.tag, *long.time, long.value, long.unit}
         whole = tuple(quality_places(sheet.layout.header, top, taken))
-        return Plan(False, long.time, {}, whole_quality=whole, long=long, named=bool(way.own))
+        named = bool(way.own)
+        return Plan(sheet, way, False, long.time, {}, whole_quality=whole, long=long, named=named)
     written = tagged_columns(sheet.layout.given)
     if written and way.tags is None and set(written["op"]) != set(written["pv"]):
-        return _one_loop(sheet, options, top)
-    return _wide(sheet, way, top) or _one_loop(sheet, options, top)
+        return _one_loop(sheet, way, top)
+    return _wide(sheet, way, top) or _one_loop(sheet, way, top)
 
 
-def _one_loop(sheet: Sheet, options: IntakeOptions, top: Sequence[Cells]) -> Plan:
+def _one_loop(sheet: Sheet, way: FileWay, top: Sequence[Cells]) -> Plan:
     """Return the plan of a file of one loop, by the names given or the usual ones."""
-    columns = options.columns
+    options, columns = way.options, way.options.columns
     written = tagged_columns(sheet.layout.given)
     op = columns.op or written.get("op") or {DEFAULT_VALVE: _usual(sheet, "op") or "OP"}
     pv = columns.pv or written.get("pv") or {DEFAULT_OUTPUT: _usual(sheet, "pv") or "PV"}
@@ -170,7 +173,7 @@ def _one_loop(sheet: Sheet, options: IntakeOptions, top: Sequence[Cells]) -> Pla
     if mode is not None and mode not in chosen.values() and mode != clocks.time.place:
         chosen[Key("mode", "")] = mode
     named = bool(columns.op and columns.pv) or bool(written)
-    return _plan(sheet, top, {sheet.name: chosen}, clocks, single=True, named=named)
+    return _plan(sheet, way, top, {sheet.name: chosen}, clocks, single=True, named=named)
 
 
 class _Clocks(NamedTuple):
@@ -282,11 +285,12 @@ def _wide(sheet: Sheet, way: FileWay, top: Sequence[Cells]) -> Plan | None:
     places = [index for signals in loops.values() for index in signals.values()]
     clocks = _clocks(sheet, places, way.options, top)
     clocks = clocks._replace(notes=(*notes, *clocks.notes))
-    return _plan(sheet, top, loops, clocks, single=False, named=bool(way.own))
+    return _plan(sheet, way, top, loops, clocks, single=False, named=bool(way.own))
 
 
 def _plan(
     sheet: Sheet,
+    way: FileWay,
     top: Sequence[Cells],
     loops: Mapping[str, Mapping[Key, int]],
     clocks: _Clocks,
@@ -299,7 +303,8 @@ def _plan(
     time, own, notes = clocks
     of_time = {place for clock in (time, *own.values()) for place in clock}
     beside, whole = qualities_of(sheet.layout.header, top, places, of_time)
-    return Plan(single, time, loops, own, beside, whole, named=named, notes=tuple(notes))
+    found = Plan(sheet, way, single, time, loops, own, beside, whole)
+    return dataclasses.replace(found, named=named, notes=tuple(notes))
 
 
 def _without_loop(

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.errors import InputError
-from stiction_ros.intake.intake_options import IntakeOptions
 from stiction_ros.intake.sheets.cells import Numbers, Words
 from stiction_ros.intake.sheets.names import unit_in
 from stiction_ros.intake.sheets.sheet import Sheet
@@ -18,22 +17,20 @@ from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, in_seconds
 from stiction_ros.intake.tables.plan import OneValue, Plan
 from stiction_ros.intake.tables.qualities import bad_qualities
-from stiction_ros.intake.tables.tags import FileWay
 from stiction_ros.records.csv_writer import QUALITY
 from stiction_ros.records.record import QUALITY_WORDS, QualityArray
 
 Reader = tuple[int, Numbers] | tuple[int, Words]
 
 
-def blocks_of(sheet: Sheet, plan: Plan, way: FileWay) -> dict[str, list[Block]]:
+def blocks_of(plan: Plan) -> dict[str, list[Block]]:
     """Read a table into blocks, by the name of their loop."""
-    if plan.long is not None:
-        return _long(sheet, plan, plan.long, way)
-    return _beside(sheet, plan, way.options)
+    return _beside(plan) if plan.long is None else _long(plan, plan.long)
 
 
-def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[Block]]:
+def _beside(plan: Plan) -> dict[str, list[Block]]:
     """Read a table with one row a stamp: a block for each clock of a loop."""
+    sheet = plan.sheet
     numbers: dict[int, Numbers] = {}
     words: dict[int, Words] = {}
     for signals in plan.loops.values():
@@ -45,9 +42,9 @@ def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[
     for quality in itertools.chain(plan.whole_quality, *plan.quality.values()):
         words[quality] = Words()
     clocks = dict.fromkeys((plan.time, *plan.own.values()))
-    lines, times = _read(sheet, [*numbers.items(), *words.items()], clocks, options, least=2)
+    lines, times = _read(plan, [*numbers.items(), *words.items()], clocks, least=2)
     alike = {clock: next(k for k in times if _same(times[k], times[clock])) for clock in times}
-    mask, whole_bad, told = _whole_quality(sheet, plan, words)
+    mask, whole_bad, told = _whole_quality(plan, words)
     notes = [*plan.notes, *(time.note for time in times.values()), *told]
     found: dict[str, list[Block]] = {}
     for name, signals in plan.loops.items():
@@ -75,14 +72,15 @@ def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[
     return found
 
 
-def _long(sheet: Sheet, plan: Plan, long: OneValue, way: FileWay) -> dict[str, list[Block]]:
+def _long(plan: Plan, long: OneValue) -> dict[str, list[Block]]:
     """Read a table with one value a row: one block a tag."""
+    sheet = plan.sheet
     names, units, values = Words(), Words(), Numbers(sheet.decimal_comma)
     quality = {index: Words() for index in plan.whole_quality}
     readers: list[Reader] = [(long.tag, names), (long.value, values), *quality.items()]
     if long.unit is not None:
         readers.append((long.unit, units))
-    lines, times = _read(sheet, readers, [plan.time], way.options, least=1)
+    lines, times = _read(plan, readers, [plan.time], least=1)
     time, whole = times[plan.time], Column("", values.values(), values.blank())
     bad, notes = _bad_rows(sheet, quality)
     tag_codes = names.codes()
@@ -92,7 +90,7 @@ def _long(sheet: Sheet, plan: Plan, long: OneValue, way: FileWay) -> dict[str, l
     edges = np.searchsorted(tag_codes[order], np.arange(len(names.known) + 1))
     found: dict[str, list[Block]] = {}
     for code, name in enumerate(names.known):
-        tag = way.read(name)
+        tag = plan.way.read(name)
         if tag is None or not tag.loop or tag.quality:
             continue
         rows = order[edges[code] : edges[code + 1]]
@@ -114,14 +112,10 @@ def _long(sheet: Sheet, plan: Plan, long: OneValue, way: FileWay) -> dict[str, l
 
 
 def _read(
-    sheet: Sheet,
-    readers: Sequence[Reader],
-    clocks: Iterable[TimeColumn],
-    options: IntakeOptions,
-    *,
-    least: int,
+    plan: Plan, readers: Sequence[Reader], clocks: Iterable[TimeColumn], *, least: int
 ) -> tuple[NDArray[np.int64], Mapping[TimeColumn, Times]]:
     """Read columns; return the lines of their rows, shape (N,), and the times of each clock."""
+    sheet, options = plan.sheet, plan.way.options
     stamps = {clock: Stamps(sheet.decimal_comma, options.dates) for clock in clocks}
     lines: list[NDArray[np.int64]] = []
     for columns, place in sheet.pieces():
@@ -199,10 +193,10 @@ def _without_bad(column: Column, bad: FlagArray | None) -> Column:
 
 
 def _whole_quality(
-    sheet: Sheet, plan: Plan, words: Mapping[int, Words]
+    plan: Plan, words: Mapping[int, Words]
 ) -> tuple[QualityArray | None, FlagArray | None, list[str]]:
     """Return the mask of a record's own file, or which rows are of bad quality, and notes."""
-    read = {index: words[index] for index in plan.whole_quality}
+    sheet, read = plan.sheet, {index: words[index] for index in plan.whole_quality}
     if [sheet.layout.given[index] for index in read] == [QUALITY]:
         (own,) = read.values()
         known = [word.strip() for word in own.known]
