@@ -77,10 +77,7 @@ def run(options: argparse.Namespace) -> int:
 
     shared = {key: getattr(options, key) for key in searches.ORDERS if key not in chosen}
     settings = IdentificationOptions(
-        **shared,
-        delay=options.delay,
-        law=options.law,
-        kind=options.kind,
+        **shared, delay=options.delay, law=options.law, kind=options.kind
     )
     search = searches.identify_by(options.method, settings, chosen)
     with bar("identifying") as show:
