@@ -71,15 +71,6 @@ class Phases:
     after: Phase | None
 
 
-def round_length(sp: FloatArray) -> int | None:
-    """Return the samples after which moves of ``sp``, (N, p), repeat exactly; None if never."""
-    moves = [first for first, _ in holds(sp)[1:]]
-    for length in moves:
-        if 2 * length <= len(sp) and np.array_equal(sp[length:], sp[:-length]):
-            return int(length)
-    return None
-
-
 def offset(error: FloatArray, stretches: Sequence[tuple[int, int]]) -> float:
     """Return the mean over holds of |mean error| over the last 50 samples of each."""
     long_enough = [(a, b) for a, b in stretches if b - a >= 2 * OFFSET_SAMPLES]

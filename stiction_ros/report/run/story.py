@@ -13,7 +13,7 @@ from stiction_ros.processes.process import NoiseEntry
 from stiction_ros.records.bag.run_metadata import mapping_of
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.log import RunLog
-from stiction_ros.report.run.scoring import Phase, Phases, phases, round_length, score
+from stiction_ros.report.run.scoring import Phase, Phases, phases, score
 
 TANK_UNITS = {"C": "kg/m³", "T": "°C"}
 
@@ -96,12 +96,10 @@ def tell(log: RunLog, *, scenario: Scenario | None = None, name: str | None = No
 
 
 def round_of(log: RunLog, scenario: Scenario | None) -> int | None:
-    """Return the samples of one round of the set-point schedule.
+    """Return the samples of one round of the set-points; None where they do not repeat.
 
-    It is the scenario's, or else what the node ``plant`` said; only when neither tells it
-    the recorded moves are looked at, which show no repetition in a run that was cut.
+    It is the scenario's schedule, or else what the node ``plant`` said.
     """
-    record = log.record
     length = math.inf
     if scenario is not None:
         length = scenario.set_points.repeat
@@ -110,9 +108,7 @@ def round_of(log: RunLog, scenario: Scenario | None) -> int | None:
         repeat = schedule.get("repeat") if isinstance(schedule, dict) else None
         if isinstance(repeat, int | float) and repeat > 0:
             length = repeat
-    if math.isfinite(length):
-        return round(length / record.sample_time)
-    return None if record.sp is None else round_length(record.sp)
+    return round(length / log.record.sample_time) if math.isfinite(length) else None
 
 
 def simulated_plant(log: RunLog) -> tuple[LoopModel | None, int | None]:

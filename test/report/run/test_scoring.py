@@ -4,14 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.records.record import Record
-from stiction_ros.report.run.scoring import (
-    PhaseStatus,
-    iae_per_hour,
-    offset,
-    phases,
-    round_length,
-    score,
-)
+from stiction_ros.report.run.scoring import PhaseStatus, iae_per_hour, offset, phases, score
 from stiction_ros.signals.holds import holds
 from stiction_ros.signals.oscillation import amplitude, dominant_cycle
 
@@ -87,12 +80,8 @@ def test_iae_per_hour_does_not_depend_on_the_sample_time() -> None:
     assert iae_per_hour(wave(1.0, 50.0, 5000)) == pytest.approx(2 / np.pi, rel=1e-3)
 
 
-def test_holds_and_rounds() -> None:
-    sp = schedule(3)
-    assert holds(sp)[:3] == [(0, 200), (200, 400), (400, 600)]
-    assert round_length(sp) == ROUND
-    assert round_length(np.ones((100, 1))) is None
-    assert round_length(np.cumsum(np.ones((100, 1)))[:, None]) is None
+def test_holds() -> None:
+    assert holds(schedule(3))[:3] == [(0, 200), (200, 400), (400, 600)]
 
 
 @settings(max_examples=20)

@@ -40,14 +40,9 @@ def test_the_announced_round_decides(samples: int, status: PhaseStatus) -> None:
     assert tell(cut_run(samples, ANNOUNCED)).phases.status is status
 
 
-def test_without_it_the_recorded_moves_stand_in() -> None:
-    assert round_of(cut_run(600, "{node: /plant}"), None) == ROUND
-    assert round_of(cut_run(300, "{node: /plant}"), None) is None
-
-
 @pytest.mark.parametrize("config", ["{", "- 1", "{node: 3}", "{node: /plant, set_points: []}"])
-def test_a_configuration_that_says_nothing_is_passed_over(config: str) -> None:
-    assert round_of(cut_run(600, config), None) == ROUND
+def test_a_configuration_that_says_nothing_tells_no_round(config: str) -> None:
+    assert round_of(cut_run(600, config), None) is None
 
 
 def test_a_cut_at_the_swap_is_no_swap() -> None:
