@@ -129,7 +129,7 @@ def responses(
     """Return a figure of each output with its responses to a step of each stem by 1 %."""
     if not outputs:
         return ""
-    length = settling(outputs, truth)
+    length = settling(outputs)
     drawn = []
     for i, output in enumerate(outputs):
         curves = [
@@ -165,13 +165,9 @@ def true_response(model: LoopModel, output: int, valve: int, samples: int) -> Fl
     return model.process.linear(model.sample_time).step_responses(samples)[:, output, valve]
 
 
-def settling(outputs: Sequence[Mapping[str, Any]], truth: LoopModel | None) -> int:
-    """Return after how many samples the slowest of the shown models has settled."""
-    if truth is not None:
-        linear = truth.process.linear(truth.sample_time)
-        radius = float(np.abs(np.linalg.eigvals(linear.a)).max())
-    else:
-        radius = max(largest_root(np.array([1.0, *output["a"]])) for output in outputs)
+def settling(outputs: Sequence[Mapping[str, Any]]) -> int:
+    """Return after how many samples the slowest of the identified models has settled."""
+    radius = max(largest_root(np.array([1.0, *output["a"]])) for output in outputs)
     if not 0.0 < radius < 1.0:
         return 100
     return int(np.clip(math.ceil(math.log(0.01) / math.log(radius)), 20, 400))
