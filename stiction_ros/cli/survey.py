@@ -223,14 +223,8 @@ def _engine(options: argparse.Namespace) -> Any:
         if options.jobs < 1:
             raise InputError(f"{options.jobs} is no number of processes", where="--jobs")
         return LocalEngine(options.jobs)
-    from stiction_ros.survey.engines.dask import SCHEME, DaskEngine
+    from stiction_ros.survey.engines.dask import DaskEngine
 
-    if not options.engine.startswith(SCHEME):
-        raise InputError(
-            f"unknown engine {options.engine!r}",
-            where="--engine",
-            fix=f"use local, or {SCHEME}HOST:PORT",
-        )
     return DaskEngine(options.engine)
 
 

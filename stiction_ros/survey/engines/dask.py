@@ -21,6 +21,14 @@ class DaskEngine(Engine):
 
     def __init__(self, address: str) -> None:
         """Connect to ``dask://HOST:PORT``; refused without Dask, an answer or a worker."""
+        place = address.removeprefix(SCHEME)
+        host, _, port = place.rpartition(":")
+        if place == address or not host or not port.isdigit():
+            raise InputError(
+                f"unknown engine {address!r}",
+                where="--engine",
+                fix=f"use local, or {SCHEME}HOST:PORT",
+            )
         try:
             import dask
             import distributed
@@ -30,12 +38,6 @@ class DaskEngine(Engine):
                 where="--engine",
                 fix="install the extra: pip install 'stiction_ros[dask]'",
             ) from None
-        place = address.removeprefix(SCHEME)
-        host, _, port = place.rpartition(":")
-        if not host or not port.isdigit():
-            raise InputError(
-                f"{address} names no scheduler", where="--engine", fix="write dask://HOST:PORT"
-            )
         secure = bool(dask.config.get("distributed.comm.require-encryption", False))
         url = f"{'tls' if secure else 'tcp'}://{place}"
         self.name = address
