@@ -13,8 +13,7 @@ from stiction_ros.report.run.figures import whole_run
 from stiction_ros.report.run.identified import KINDS, valve_cards
 from stiction_ros.report.run.report import mode_lines
 from stiction_ros.report.run.scoring import Phase, PhaseStatus, errors, phases
-from stiction_ros.report.run.story import Story, tell
-from stiction_ros.report.run.summary import summary
+from stiction_ros.report.run.story import Story, summary, tell
 from stiction_ros.signals.oscillation import amplitude, pieces
 from stiction_ros.survey.neighbours import Neighbours, is_outer, neighbours
 from stiction_ros.texts import moment

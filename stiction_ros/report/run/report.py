@@ -12,8 +12,7 @@ from stiction_ros.report.page import Cell, folded, number, percent, table, write
 from stiction_ros.report.run import identified
 from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.scoring import PhaseStatus
-from stiction_ros.report.run.story import Story
-from stiction_ros.report.run.summary import summary
+from stiction_ros.report.run.story import Story, summary
 from stiction_ros.texts import moment, spoken
 
 _SCORES = (

@@ -68,8 +68,7 @@ def add(commands: Any) -> None:
 def run_seed(scenario: "Scenario", seed: int, *, ideal_valves: bool) -> Outcome:
     """Run one seed; a plain function, so that a worker process can run it."""
     from stiction_ros.online.session import run_live
-    from stiction_ros.report.run.story import tell
-    from stiction_ros.report.run.summary import summary
+    from stiction_ros.report.run.story import summary, tell
     from stiction_studies.commands.live_log import log_of
 
     chosen = dataclasses.replace(scenario, seed=seed)

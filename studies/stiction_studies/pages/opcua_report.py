@@ -15,7 +15,7 @@ from stiction_ros.records.bag.messages import BagMessage, last_part, read_messag
 from stiction_ros.records.run.log import RunLog, read_run
 from stiction_ros.report.page import number, table, write_page
 from stiction_ros.report.run.scoring import Phases, phases
-from stiction_ros.report.run.summary import measured, messages
+from stiction_ros.report.run.story import measured, messages
 from stiction_ros.texts import finite, spoken
 from stiction_studies.control_system.journal import transfer_steps
 

@@ -8,8 +8,7 @@ import pytest
 from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.page import write_page
 from stiction_ros.report.run.scoring import NOISE_SHARE
-from stiction_ros.report.run.story import tell
-from stiction_ros.report.run.summary import summary
+from stiction_ros.report.run.story import summary, tell
 
 
 def test_the_keys_that_the_contract_names(log: RunLog) -> None:
