@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from stiction_ros.gain.advice import MEASURES, advice
+from stiction_ros.gain.advice import MEASURES, NAMES, advice
 from stiction_ros.identification import Identification
 from stiction_ros.pages.frame import text
 from stiction_ros.pages.signals import UNITS, Units
@@ -13,13 +13,6 @@ from stiction_ros.report.page import Cell, table
 from stiction_ros.report.record_page import record_page
 from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.pages import words as say
-
-OPTIONS = {
-    "service": "service the valve",
-    "embedding": "controller that knows the friction",
-    "retune": "retune",
-    "leave": "leave it",
-}
 
 
 def loop_page(
@@ -45,7 +38,8 @@ def gain_table(gain: Mapping[str, Any], units: Units) -> str:
     for option in gain["options"]:
         ends = option["interval"].get("iae_per_hour")
         between = f" Mean |PV−SP| {say.interval((ends[0], ends[1]))}." if ends else ""
-        told.append((OPTIONS[option["what"]], option, option["note"] + between))
+        what = NAMES.get(option["what"], "leave it")
+        told.append((what, option, option["note"] + between))
     rows: list[list[Cell]] = [
         [what, *(say.figure(found[key]) or "–" for key in MEASURES), ("t wordy", note)]
         for what, found, note in told
