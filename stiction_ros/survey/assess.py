@@ -120,7 +120,8 @@ def _assessed(loop: Loop, entry: Entry, options: SurveyOptions) -> Assessed:
     for option in gain["options"] if gain else ():
         log.append(f"gain, {option['what']}: {option['note']}")
     log.append(f"took {time.perf_counter() - begun:.1f} s")
-    page = loop_page(entry, record, found, gain, options.unit(entry.name)) if options.pages else ""
+    unit = dict(options.units).get(entry.name, "")
+    page = loop_page(entry, record, found, gain, unit) if options.pages else ""
     return Assessed(entry, page, tuple(log))
 
 

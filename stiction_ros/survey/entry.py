@@ -20,10 +20,6 @@ class SurveyOptions:
     units: tuple[tuple[str, str], ...] = ()  # engineering unit of PV by loop, for the pages
     read_by: str = ""  # how the exports are read; other ways give other records
 
-    def unit(self, name: str) -> str:
-        """Return the unit of a loop's PV; empty where none was given."""
-        return dict(self.units).get(name, "")
-
     def mark(self) -> str:
         """Return what tells options apart whose entries differ."""
         return repr((self.identification, self.gain, self.read_by))

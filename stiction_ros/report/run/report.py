@@ -135,10 +135,6 @@ def _ratio(now: float | None, was: float | None) -> float | None:
     return None if was is None or now is None or was <= 0 else float(now / was)
 
 
-def _judged(ratio: float) -> str:
-    return "good" if ratio < 1 else "bad"
-
-
 def _changes(story: Story) -> str:
     told = [
         f"of {name} to {100 * ratio:.0f} %"
@@ -177,7 +173,9 @@ def _gain(story: Story) -> str:
         row: list[Cell] = [who, label, number(was)]
         if later:
             ratio = _ratio(later[0], was)
-            kind = "" if ratio is None or who in story.record.valves else _judged(ratio)
+            kind = ""
+            if ratio is not None and who not in story.record.valves:
+                kind = "good" if ratio < 1 else "bad"
             row += [number(later[0]), (kind, "–" if ratio is None else f"{100 * ratio:.0f} %")]
         for ideal in later[1:]:
             ratio = _ratio(later[0], ideal)

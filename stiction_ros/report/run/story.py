@@ -48,11 +48,6 @@ class Story:
         fit = self.log.fit_at_swap or (self.log.fits[-1] if self.log.fits else None)
         return {} if fit is None else fit.identification
 
-    @property
-    def latest(self) -> Mapping[str, Any]:
-        """The last fit, empty when there is none."""
-        return self.log.fits[-1].identification if self.log.fits else {}
-
     def true_friction(self, valve: str) -> tuple[float, float] | None:
         """Return f_S and f_D of the simulated plant, (0, 0) for an ideal valve, None if unknown."""
         if self.truth is None:
@@ -144,7 +139,7 @@ def summary(story: Story, seconds: float | None = None) -> dict[str, Any]:
     """
     log, record, free = story.log, story.record, story.stiction_free
     seconds = log.wall_seconds if seconds is None else seconds
-    found = story.phases
+    found, latest = story.phases, log.fits[-1].identification if log.fits else {}
     mapping = {
         "scenario": story.name,
         "status": found.status.value,
@@ -157,7 +152,7 @@ def summary(story: Story, seconds: float | None = None) -> dict[str, Any]:
         "swap_time": story.swap_time,
         "delay": {o["name"]: dict(o["delay"]) for o in story.identified.get("outputs", [])},
         "valves": list(story.identified.get("valves", [])),
-        "valves_latest": list(story.latest.get("valves", [])),
+        "valves_latest": list(latest.get("valves", [])),
         "period": None if found.cycle is None else found.cycle.period * record.sample_time,
         "cycles": None if found.cycle is None else found.cycle.count,
         **measured({"before": found.before, "after": found.after, "stiction_free": free}),
