@@ -45,7 +45,6 @@ def over_time(
     shade: Sequence[tuple[float, float]] = (),
     *,
     marks: Sequence[float] = (),
-    limits: tuple[float, float] | None = None,
 ) -> str:
     """Return a figure of curves over one time, whose axis the script of the page writes and zooms.
 
@@ -57,9 +56,8 @@ def over_time(
         start: of the record; dates are shown where it is one, s since 1970.
         shade: begin and end of stretches that are shaded, s of ``time``.
         marks: where a vertical line stands, s of ``time``.
-        limits: of what goes up; None shows all values.
     """
-    low, high = limits or _range([curve.values for curve in curves])
+    low, high = _range([curve.values for curve in curves])
     span = float(max(time[-1] - time[0], 1e-9))
     dated = DATED[0] <= start <= DATED[1]
     unit, size = ("date", 1.0) if dated else _unit(span)

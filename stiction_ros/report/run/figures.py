@@ -1,6 +1,6 @@
 """The figures of a run: signals around the swap and of all, estimates, step responses."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -65,13 +65,7 @@ def estimates(story: Story) -> str:
             title = f"{symbol} of {valve}: each fit from the end of its window to the next one."
             drawn.append(
                 over_time(
-                    title,
-                    time,
-                    curves,
-                    f"{words(symbol)}, %",
-                    record.start,
-                    marks=_swaps(story),
-                    limits=_limits(curves),
+                    title, time, curves, f"{words(symbol)}, %", record.start, marks=_swaps(story)
                 )
             )
     return (
@@ -106,14 +100,6 @@ def _aware(story: Story) -> tuple[tuple[float, float], ...]:
     begins = [max(log.seconds(change.stamp), 0.0) for change in log.modes]
     spans = zip(log.modes, begins, [*begins[1:], end], strict=False)
     return tuple((first, last) for change, first, last in spans if change.mode != "unaware")
-
-
-def _limits(curves: Sequence[Curve]) -> tuple[float, float]:
-    """Return limits around frictions, %; at least 0.5 % apart, so that nothing looks like much."""
-    values = np.concatenate([curve.values for curve in curves])
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    room = max(0.12 * (high - low), (0.5 - (high - low)) / 2)
-    return max(low - room, 0.0), high + room
 
 
 def _held(at: list[int], told: Mapping[int, tuple[float, ...]], width: int) -> FloatArray:
