@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from importlib import resources
 
-from stiction_ros.pages.frame import SCROLLED, framed, text, words
-from stiction_ros.report.page import card
+from stiction_ros.pages.frame import framed, text, words
+from stiction_ros.report.page import Cell, card, table
 from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.listing.columns import COST, Column, columns_of
 from stiction_ros.survey.listing.headline import Earlier, changed, headline, kind_of, worked
@@ -95,24 +95,13 @@ def _table(entries: Sequence[Entry], columns: Sequence[Column]) -> str:
 def _groups(survey: Survey) -> str:
     if not survey.groups:
         return ""
-    pages = {entry.name: entry.report for entry in survey.entries}
-
-    def named(name: str) -> str:
-        page = pages.get(name)
-        return f'<a href="{text(page)}">{text(name)}</a>' if page else text(name)
-
-    heads = (("", "group"), ("", "period"), ("t", "likely source"), ("t", "with it"))
-    titles = "".join(f'<th scope="col" class="{kind}">{head}</th>' for kind, head in heads)
-    rows = "".join(
-        f"<tr><td>{group.number}</td><td>{text(spoken(group.period))}</td>"
-        f"<td class='t'>{named(group.names[0])}</td>"
-        f"<td class='t'>{', '.join(named(name) for name in group.names[1:])}</td></tr>"
+    rows: list[list[Cell]] = [
+        [group.names[0], ", ".join(group.names[1:]), str(group.number), spoken(group.period)]
         for group in survey.groups
-    )
+    ]
     return (
         "<h2>Loops that cycle together</h2><p>They keep the same time; the likely source comes "
-        f"first.</p>{SCROLLED}<table><thead><tr>{titles}</tr></thead>"
-        f"<tbody>{rows}</tbody></table></div>"
+        "first.</p>" + table(("likely source", "with it", "group", "period"), rows, texts=2)
     )
 
 
