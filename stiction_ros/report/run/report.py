@@ -90,19 +90,13 @@ def mode_lines(story: Story) -> list[str]:
 
 
 def _later_changes(story: Story, swap: ModeChange) -> list[str]:
-    """Tell of changes of mode after the swap, such as a roll-back, and of new friction."""
-    lines, mode, renewed = [], swap.mode, 0
+    """Tell of changes of mode after the swap, such as a roll-back."""
+    lines, mode = [], swap.mode
     for change in story.log.modes:
-        if change.stamp <= swap.stamp:
-            continue
-        if change.mode == mode:
-            renewed += 1
+        if change.stamp <= swap.stamp or change.mode == mode:
             continue
         at, mode = moment(story.log.seconds(change.stamp)), change.mode
         lines.append(f"After {at} it changed to {mode}: {change.reason}.")
-    if renewed:
-        times = {1: "once", 2: "twice"}.get(renewed, f"{renewed} times")
-        lines.append(f"Since the swap it has taken over new friction values {times}.")
     return lines
 
 
