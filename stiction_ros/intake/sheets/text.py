@@ -64,7 +64,8 @@ def open_text(path: Path) -> Iterator[io.TextIOBase]:
         if first.startswith(start):
             raise InputError(what, fix=fix)
     try:
-        with _opened(path, first) as data:
+        unpacked: Any = gzip.open if first.startswith(GZIP) else opened
+        with unpacked(path) as data:
             buffered = io.BufferedReader(data, 1 << 20)
             encoding = _encoding(buffered.peek(HEAD)[:HEAD])
             yield io.TextIOWrapper(
@@ -72,10 +73,6 @@ def open_text(path: Path) -> Iterator[io.TextIOBase]:
             )
     except (EOFError, zlib.error, gzip.BadGzipFile):
         raise InputError("is cut off or damaged", fix="pack or copy it anew") from None
-
-
-def _opened(path: Path, first: bytes) -> contextlib.AbstractContextManager[Any]:
-    return gzip.open(path, "rb") if first.startswith(GZIP) else opened(path)
 
 
 def _encoding(head: bytes) -> str:
