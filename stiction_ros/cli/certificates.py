@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        "certificates",
-        description="Make our certificate and key, pin the certificate of a server.",
+        "certificates", description="Make our certificate and key, pin the certificate of a server."
     )
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
     make = actions.add_parser("make", help="make a self-signed certificate and its key")

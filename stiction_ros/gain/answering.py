@@ -138,10 +138,11 @@ class Answering:
         orders = self.lags, self.lags
         return arx_columns(self.pv, stems.T, self.delay.tolist(), orders, self.past)
 
-    def _products(self, stems: FloatArray) -> "_Products":
+    def _products(self, stems: FloatArray) -> tuple[FloatArray, FloatArray, float, int]:
+        """Return all sums over rows that a solution takes, and the number of rows."""
         seen, wave = self.pv[self.past :], self.wave[self.past :]
         table = np.column_stack([*self._columns(stems), np.ones(len(seen)), wave])
-        return _Products(table.T @ table, table.T @ seen, float(seen @ seen), len(seen))
+        return table.T @ table, table.T @ seen, float(seen @ seen), len(seen)
 
     def _tuned(self, stems: FloatArray) -> "tuple[float, Answering]":
         """Return −2 log of the likelihood of the best prior, downhill, and that prior in use."""
@@ -158,10 +159,13 @@ class Answering:
             prior = better
         return loss(prior), dataclasses.replace(self, prior=prior)
 
-    def _solved(self, products: "_Products", prior: Prior) -> tuple[float, Answer]:
+    def _solved(
+        self, products: tuple[FloatArray, FloatArray, float, int], prior: Prior
+    ) -> tuple[float, Answer]:
         """Return −2 log of the marginal likelihood, up to a constant, and the equation."""
         n, valves = self.lags, len(self.delay)
-        precision, determinant = products.gram.copy(), 0.0
+        gram, side, energy, count = products
+        precision, determinant = gram.copy(), 0.0
         for part in range(1 + valves):
             decay, size = prior[:2] if part == 0 else prior[2:]
             inverse, log_determinant = _prior(decay, n)
@@ -172,21 +176,12 @@ class Answering:
         precision[free, free] += FREE
         determinant -= len(free) * np.log(FREE)
         factor = np.asarray(np.linalg.cholesky(precision), dtype=np.float64)
-        half = np.linalg.solve(factor, products.side)
-        energy = products.energy
-        variance = max(energy - float(half @ half), 1e-12 * energy) / products.count
+        half = np.linalg.solve(factor, side)
+        variance = max(energy - float(half @ half), 1e-12 * energy) / count
         determinant += 2.0 * float(np.log(np.diag(factor)).sum())
         mean = np.linalg.solve(factor.T, half)
         answer = Answer(mean, factor, variance, n, valves)
-        return products.count * np.log(variance) + determinant, answer
-
-
-@dataclasses.dataclass(frozen=True)
-class _Products:
-    gram: FloatArray
-    side: FloatArray
-    energy: float
-    count: int
+        return count * np.log(variance) + determinant, answer
 
 
 def _near(prior: Prior) -> Iterator[Prior]:
