@@ -10,7 +10,7 @@ from typing import Any
 from stiction_ros.errors import InputError, storing
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.engines.engine import Engine, Task
-from stiction_ros.survey.entry import Entry, Status, SurveyOptions
+from stiction_ros.survey.entry import Entry, SurveyOptions
 from stiction_ros.survey.groups import Group, grouped, ranked
 from stiction_ros.survey.journal import Journal, key_of
 
@@ -29,11 +29,6 @@ class Survey:
     groups: tuple[Group, ...]  # of loops that cycle together
     date: str = ""  # when it was done, ISO
     before: int = 0  # loops that were taken from the survey that it went on with
-
-    @property
-    def judged(self) -> int:
-        """How many loops were judged, in this run or before."""
-        return sum(entry.status is Status.OK for entry in self.entries)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``survey --json``."""

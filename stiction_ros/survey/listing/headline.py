@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.pages.words import signed_percent
@@ -56,7 +55,8 @@ def steps_of(entry: Entry, earlier: Sequence[Earlier]) -> list[tuple[str, float]
 
 def headline(survey: Survey) -> str:
     """Return how many valves are to be looked at, or that none could be judged."""
-    count, judged = len(survey.entries), survey.judged
+    count = len(survey.entries)
+    judged = sum(entry.status is Status.OK for entry in survey.entries)
     found = sum(entry.found for entry in survey.entries)
     if count and not judged:
         return f"{count} of {count} could not be judged"
@@ -98,8 +98,7 @@ def _listed(names: Sequence[str]) -> str:
 def change(entry: Entry, what: str) -> float | None:
     """Return what an option changes of the mean |PV − SP|: −.75 leaves a quarter of it."""
     gain = entry.gain or {}
-    before = _of(gain, "now").get("iae_per_hour")
-    after = _of(gain, what).get("iae_per_hour")
+    before, after = ((gain.get(key) or {}).get("iae_per_hour") for key in ("now", what))
     if not before or after is None:
         return None
     return float(after) / float(before) - 1.0
@@ -119,13 +118,8 @@ def in_words(entry: Entry, what: str) -> str:
 
 def note_of(entry: Entry, what: str) -> str:
     """Return what ``gain`` says of an option; empty where it was not asked."""
-    return str(_of(entry.gain or {}, what).get("note", ""))
+    return str(((entry.gain or {}).get(what) or {}).get("note", ""))
 
 
 def _short(note: str) -> str:
     return next((word for said, word in WHY if said in note), "")
-
-
-def _of(gain: Mapping[str, Any], what: str) -> Mapping[str, Any]:
-    found = gain.get(what)
-    return found if isinstance(found, Mapping) else {}
