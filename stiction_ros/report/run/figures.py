@@ -12,12 +12,6 @@ from stiction_ros.report.run.identified import responses
 from stiction_ros.report.run.story import Story
 
 
-def draw_run(story: Story) -> list[str]:
-    """Return every section of figures that the run has data for, HTML."""
-    drawers = (end_of_cycle, whole_run, estimates, step_responses)
-    return [drawer(story) for drawer in drawers]
-
-
 def end_of_cycle(story: Story) -> str:
     """Return four cycles on either side of the swap."""
     cycle, swap = story.phases.cycle, story.log.swap_sample

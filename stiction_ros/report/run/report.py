@@ -9,8 +9,7 @@ from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.events import ModeChange
 from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.page import Cell, folded, number, percent, table, write_page
-from stiction_ros.report.run import identified
-from stiction_ros.report.run.figures import draw_run
+from stiction_ros.report.run import figures, identified
 from stiction_ros.report.run.scoring import PhaseStatus
 from stiction_ros.report.run.story import Story, summary
 from stiction_ros.texts import moment, spoken
@@ -39,7 +38,10 @@ def run_page(story: Story) -> str:
         *[f'<p class="lead">{words(line)}</p>' for line in findings(story)],
         identified.valve_cards(story.identified.get("valves", []), story),
         _gain(story),
-        *draw_run(story),
+        figures.end_of_cycle(story),
+        figures.whole_run(story),
+        figures.estimates(story),
+        figures.step_responses(story),
         monitor_section(story.log),
         identified.process_table(story.identified.get("outputs", []), record.sample_time),
         _configuration(story),
@@ -262,5 +264,5 @@ def report_run(
 
     Returned are the page and the mapping of the summary, with the wall time where it is known.
     """
-    figures = summary(story, seconds)
-    return write_page(out, run_page(story), figures), figures
+    told = summary(story, seconds)
+    return write_page(out, run_page(story), told), told
