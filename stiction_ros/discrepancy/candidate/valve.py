@@ -189,12 +189,21 @@ class LagCandidate(Lagging, OneFigure):
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class SlewCandidate(OneFigure):
-    """A slew by its rate and the place of the stem at the start."""
+    """A slew by its rate, the place of the stem at the start, and how late it moves in a sample."""
 
     reach: float  # how far off OP it may be at the start, %
 
+    def count(self, point: FloatArray) -> int:
+        return len(point) - 1
+
     def lead(self, point: FloatArray) -> float:
         return self.reach * float(point[1])
+
+    def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
+        stems = super().stems(run, points, from_measured=from_measured)
+        for rows in run.runs.slices if points.shape[1] > 2 else ():
+            stems[rows][1:] -= (0.5 + points[:, 2]) * np.diff(stems[rows], axis=0)
+        return stems
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -308,7 +317,7 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
         StictionCandidate.at(run, j, HeStiction, fine, needle=True),
         StictionCandidate.at(run, j, XchStiction, rough),
         BacklashCandidate.at(run, j, Backlash, bands),
-        SlewCandidate.at(run, j, Slew, rates, reach=span),
+        SlewCandidate.at(run, j, Slew, (*rates, *between), reach=span),
         LagCandidate.at(run, j, Lag, (lag_axis(run), away, *between)),
         SaturationCandidate.at(run, j, Saturation, ends, limits=limits),
         ValveCandidate.at(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),
