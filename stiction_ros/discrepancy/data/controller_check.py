@@ -27,7 +27,6 @@ from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
 
-ONCE = 5e-3  # of the moves of OP, that a law leaves which scans once
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
 
 
@@ -79,10 +78,7 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
         runs: the records.
         check: of the controller.
     """
-    untold = any(record.sp is None for record in runs.records)
-    given = check.status in (ControllerStatus.NOT_ASKED, ControllerStatus.OTHER) and not untold
-    asked = not given and check.left > NEGLIGIBLE and check.scans is None
-    asked = asked or check.between
+    asked = scans_in_doubt(runs, check)
     found = []
     for op in runs.op.T:
         moves = np.concatenate([np.diff(op[rows]) for rows in runs.slices])
@@ -97,6 +93,14 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
             beside.append(Unseen((0.5 * spread) ** 2))  # it is held for half a sample
         found.append(tuple(beside))
     return tuple(found)
+
+
+def scans_in_doubt(runs: Runs, check: ControllerCheck) -> bool:
+    """Tell whether a controller may have scanned again between samples, which no law shows."""
+    untold = any(record.sp is None for record in runs.records)
+    given = check.status in (ControllerStatus.NOT_ASKED, ControllerStatus.OTHER) and not untold
+    asked = not given and check.left > NEGLIGIBLE and check.scans is None
+    return asked or check.between
 
 
 def _kept(op: FloatArray, slices: Sequence[slice]) -> float:
@@ -140,7 +144,7 @@ def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
     if all(record.sp is not None for record in runs.records):
         return _compared(model, runs)
     once, twice = (_told_by(model, runs, scans) for scans in (1, 2))
-    return once if once.left <= ONCE or twice.scans is None else twice
+    return once if once.left <= TRACE or twice.scans is None else twice
 
 
 def _told_by(model: LoopModel, runs: Runs, scans: int) -> ControllerCheck:
@@ -211,7 +215,7 @@ class _Law:
 
 def _scans(model: LoopModel, runs: Runs, law: _Law) -> Scans | None:
     """Return the law of a controller that scans twice, where one scan does not give OP."""
-    if law.left <= max(LARGER * _rounding(runs, law), ONCE):
+    if law.left <= max(LARGER * _rounding(runs, law), TRACE):
         return None
     found = scanned_twice(model, runs)
     if found is None or model.controller is None or _alike(model.controller, found):

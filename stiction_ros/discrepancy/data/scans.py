@@ -34,6 +34,19 @@ class Scans:
         return np.asarray(both.reshape(-1, recorded.shape[1]))
 
 
+def drawn_in(runs: Runs) -> Runs:
+    """Return records with a second scan in each sample, on a cubic through the four about it.
+
+    Which OP it holds is not told; in the mean it lies between those of its neighbours.
+    """
+    second = runs.op.copy()
+    for rows in runs.slices:
+        second[rows][:-1] = between_samples(runs.op[rows])
+    scans = np.stack([runs.op, second], axis=1).reshape(-1, runs.op.shape[1])
+    mean = 0.5 * (runs.op + second)
+    return dataclasses.replace(runs, op=mean, scans=scans, scans_told=False)
+
+
 def scanned_twice(model: LoopModel, runs: Runs) -> Scans | None:
     """Return the law of a controller that scans twice in a sample; None where none is seen.
 
@@ -94,7 +107,7 @@ def _fitted(parts: "Sequence[_Part]") -> tuple[float, float]:
 
 
 def between_samples(values: FloatArray) -> FloatArray:
-    """Return values half-way between samples, on a cubic through four of them, shape (N − 1,)."""
+    """Return values half-way between samples, on a cubic through four, shape (N − 1, …)."""
     mean = 0.5 * (values[1:] + values[:-1])
     mean[1:-1] += (mean[1:-1] - 0.5 * (values[3:] + values[:-3])) / 8.0
     return np.asarray(mean)

@@ -6,8 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.data.controller_check import check_controller, unseen_of
+from stiction_ros.discrepancy.data.controller_check import (
+    check_controller,
+    scans_in_doubt,
+    unseen_of,
+)
 from stiction_ros.discrepancy.data.gate import DataFinding, open_gate
+from stiction_ros.discrepancy.data.scans import drawn_in
 from stiction_ros.discrepancy.decision.explanation import Explanation
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
@@ -16,7 +21,9 @@ from stiction_ros.discrepancy.measures import NEARLY_ALL, SURPRISE
 from stiction_ros.discrepancy.process.first_model import liveliest_parts
 from stiction_ros.discrepancy.simulation.between import moves_on
 from stiction_ros.discrepancy.simulation.free_run import PHASES, FreeRun, Runs
+from stiction_ros.discrepancy.steps.look import scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
+from stiction_ros.discrepancy.steps.wholes import with_process
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
@@ -59,7 +66,32 @@ def begin(
     )
     if runs is not base.run.runs:
         base = Baseline.of(FreeRun(model, runs))
-    return task, State(given=bare, before=base, now=Explanation(bare, base))
+    state = State(given=bare, before=base, now=Explanation(bare, base))
+    if options.process_fitted or not scans_in_doubt(runs, controller):
+        return task, state
+    return _scanned(task, state)
+
+
+def _scanned(task: Task, state: State) -> tuple[Task, State]:
+    """Return the records with a second scan in each sample, where all explains more by it.
+
+    Where nothing tells whether a controller scans again between two samples, the loop does.
+    """
+    margin, twice = task.options.margin, dataclasses.replace(task, runs=drawn_in(task.runs))
+    base = Baseline.of(FreeRun(task.model, twice.runs))
+    if base.score >= state.before.score:
+        return task, state
+    other = State(given=state.given, before=base, now=Explanation(state.given, base))
+    better = _least(twice, other) < _least(task, state) - margin
+    return (twice, other) if better else (task, state)
+
+
+def _least(task: Task, state: State) -> float:
+    """Return what is least: by no change of the model, by one effect or by another process."""
+    effects = [fit.evidence for fit in scored_by(task, state, 0).fits if fit.candidate.inside]
+    process = with_process(task, state, ())
+    least = state.before.score - max(0.0, *effects)
+    return least if process is None else min(least, process.score)
 
 
 def _between(model: LoopModel) -> tuple[bool, ...]:
