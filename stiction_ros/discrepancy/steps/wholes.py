@@ -4,12 +4,13 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 
+from stiction_ros.discrepancy.answer.found_effects import own_closed
 from stiction_ros.discrepancy.decision.decide import large_enough
 from stiction_ros.discrepancy.decision.explanation import AddedEffect, Explanation, ProcessChange
 from stiction_ros.discrepancy.decision.scores import Scores
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.measures import NEGLIGIBLE, TRIED
+from stiction_ros.discrepancy.measures import MATTERS, NEGLIGIBLE, TRIED
 from stiction_ros.discrepancy.process.change import changed_process
 from stiction_ros.discrepancy.simulation.equation import GAIN
 from stiction_ros.discrepancy.steps.state import State, Task
@@ -54,7 +55,16 @@ def with_process(task: Task, state: State, part: Sequence[AddedEffect]) -> Expla
     """
     grounds = (True, False) if any(declared_noise(state.given)) else (False,)
     found = [changed_process(state.given, task.runs, part, declared) for declared in grounds]
-    return _best(task, found)
+    return _best(task, [each for each in found if each is not None and _matters(state, each)])
+
+
+def _matters(state: State, found: Explanation) -> bool:
+    """Tell whether a changed process closes by itself what an effect has to close.
+
+    The given process is asked with the figures that the effects have beside the changed one.
+    """
+    without = Explanation.of(state.given, found.runs, found.effects)
+    return own_closed(without.base, found.base, dated=False, given=True) >= MATTERS
 
 
 def _best(task: Task, found: Sequence[Explanation | None]) -> Explanation | None:
@@ -83,7 +93,7 @@ def mended(task: Task, state: State) -> State | None:
     if not suspicious(state.now.base):
         return None
     margin, added = task.options.margin, state.now.effects
-    alone = [] if added else singles(state)[:TRIED]
+    alone = [] if added else singles(state, margin)[:TRIED]
     parts = [(), *((each,) for each in added or alone)]
     parts += [added] if len(added) > 1 else []
     found = _best(task, [with_process(task, state, part) for part in parts])
@@ -137,12 +147,12 @@ def changed_again(task: Task, state: State, effects: Sequence[AddedEffect]) -> E
     return found if better else None
 
 
-def singles(state: State) -> list[AddedEffect]:
-    """Return the effects that explained most alone in the first look."""
+def singles(state: State, margin: float) -> list[AddedEffect]:
+    """Return the effects that explained more than the margin alone in the first look, in order."""
     return [
         AddedEffect(fit, fit.candidate.twins)
         for fit in sorted(state.looks[0].scores.fits, key=lambda fit: -fit.evidence)
-        if fit.candidate.inside and fit.evidence > 0.0 and large_enough(fit)
+        if fit.candidate.inside and fit.evidence >= margin and large_enough(fit)
     ]
 
 
