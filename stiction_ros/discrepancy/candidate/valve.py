@@ -15,6 +15,7 @@ from stiction_ros.discrepancy.candidate.base import (
     lag_axis,
 )
 from stiction_ros.discrepancy.measures import ALONG, NEGLIGIBLE, QUARTER, ROUNDING, SLIGHT
+from stiction_ros.discrepancy.simulation.between import not_yet_moved
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, over_samples
 from stiction_ros.discrepancy.simulation.responses import end_to_end
 from stiction_ros.effects import (
@@ -201,8 +202,9 @@ class SlewCandidate(OneFigure):
 
     def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
         stems = super().stems(run, points, from_measured=from_measured)
-        for rows in run.runs.slices if points.shape[1] > 2 else ():
-            stems[rows][1:] -= (0.5 + points[:, 2]) * np.diff(stems[rows], axis=0)
+        if points.shape[1] > 2:
+            late = (0.5 + points[:, 2]) * not_yet_moved(run, stems, points[:, 0])
+            stems = stems - late
         return stems
 
 

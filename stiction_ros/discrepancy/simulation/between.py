@@ -9,7 +9,7 @@ import numpy as np
 from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.simulation.equation import Changeable, with_equation
 from stiction_ros.discrepancy.simulation.responses import end_to_end, responses_of
-from stiction_ros.effects import Behaviour, FloatArray, Lag
+from stiction_ros.effects import Behaviour, FloatArray, Lag, Slew
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxProcess
 
@@ -95,11 +95,26 @@ def _ahead(run: "FreeRun", lag: Lag, values: FloatArray) -> FloatArray:
     return np.asarray(lfilter([1.0, -keep], [1.0 - keep], values, axis=0))
 
 
+def not_yet_moved(run: "FreeRun", stems: FloatArray, rates: FloatArray | None = None) -> FloatArray:
+    """Return what stems, shape (N, G), move in each sample, %: they lack of it what is to come.
+
+    Args:
+        run: of the current model.
+        stems: positions at the ends of their moves.
+        rates: of slews, %/s, shape (G,): a move that takes a part of a sample lacks as much less.
+    """
+    moves = np.zeros_like(stems)
+    for rows in run.runs.slices:
+        moves[rows][1:] = np.diff(stems[rows], axis=0)
+    if rates is None:
+        return moves
+    return np.asarray(moves * np.abs(moves) / (rates * run.runs.sample_time))
+
+
 def _a_sample_late(run: "FreeRun", output: int, valve: int) -> FloatArray:
     """Return what an output lacks where a stem's moves come a sample late, shape (N, 1)."""
-    moves = np.zeros((len(run.runs), 1))
-    for rows in run.runs.slices:
-        moves[rows][1:, 0] = np.diff(run.stems[rows, valve])
+    slews = [each.rate for each in run.model.valves[valve].effects if isinstance(each, Slew)]
+    moves = not_yet_moved(run, run.stems[:, [valve]], np.array(slews[-1:]) if slews else None)
     return run.slope(output, valve, moves)
 
 
