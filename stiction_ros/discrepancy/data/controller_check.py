@@ -64,7 +64,9 @@ class ControllerCheck:
 NOT_ASKED = ControllerCheck(ControllerStatus.NOT_ASKED, None, 1.0, False)
 
 
-def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], ...]:
+def unseen_of(
+    runs: Runs, check: ControllerCheck, *, drawn_in: bool = False
+) -> tuple[tuple[Unseen, ...], ...]:
     """Return per valve what may act beside the recorded OP.
 
     A rounded OP is off by up to half a step: by another amount at each sample where it moves at
@@ -77,6 +79,7 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
     Args:
         runs: the records.
         check: of the controller.
+        drawn_in: whether OP is drawn in between the samples, as the loop shows a second scan.
     """
     asked = scans_in_doubt(runs, check)
     found = []
@@ -87,7 +90,8 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
         keep = 1.0 - often if often <= MANY else _kept(op, runs.slices)
         beside = [Unseen(quantum**2 / 12.0, keep)] if quantum > 0.0 else []
         beside += [] if check.unsure is None else [check.unsure]
-        if asked and often > NEARLY_ALL:  # where OP rests more often, no scan lies between samples
+        # where OP rests more often, and the loop shows no scan between samples, there is none
+        if asked and (drawn_in or often > NEARLY_ALL):
             bends = np.concatenate([0.5 * np.diff(op[rows], 2) for rows in runs.slices])
             spread = NORMAL_OF_MEDIAN * float(np.median(np.abs(bends)))
             beside.append(Unseen((0.5 * spread) ** 2))  # it is held for half a sample

@@ -77,21 +77,23 @@ def _scanned(task: Task, state: State) -> tuple[Task, State]:
 
     Where nothing tells whether a controller scans again between two samples, the loop does.
     """
-    margin, twice = task.options.margin, dataclasses.replace(task, runs=drawn_in(task.runs))
-    base = Baseline.of(FreeRun(task.model, twice.runs))
+    unseen = unseen_of(task.runs, task.controller, drawn_in=True)
+    runs = dataclasses.replace(drawn_in(task.runs), unseen=unseen)
+    twice = dataclasses.replace(task, runs=runs)
+    base = Baseline.of(FreeRun(task.model, runs))
     if base.score >= state.before.score:
         return task, state
     other = State(given=state.given, before=base, now=Explanation(state.given, base))
-    better = _least(twice, other) < _least(task, state) - margin
-    return (twice, other) if better else (task, state)
+    return (twice, other) if _least(twice, other) < _least(task, state) else (task, state)
 
 
 def _least(task: Task, state: State) -> float:
-    """Return what is least: by no change of the model, by one effect or by another process."""
+    """Return the worth of no change of the model, of one effect or another process, if better."""
+    margin = task.options.margin
     effects = [fit.evidence for fit in scored_by(task, state, 0).fits if fit.candidate.inside]
     process = with_process(task, state, ())
-    least = state.before.score - max(0.0, *effects)
-    return least if process is None else min(least, process.score)
+    least = state.before.score - max(margin, *effects) + margin
+    return least if process is None else min(least, process.worth(margin))
 
 
 def _between(model: LoopModel) -> tuple[bool, ...]:

@@ -202,11 +202,13 @@ def _louder(task: Task, state: State) -> list[FoundEffect]:
     """Return the noise beyond the declared one as effects.
 
     No valve and no plant obeys its law to the letter: beside an effect on the way from OP to PV
-    what a law misses wanders as a noise does, and is said without a name.
+    what a law misses wanders as a noise does, and is said without a name. So does what an OP
+    misses that is drawn in between the samples.
     """
     found: list[FoundEffect] = []
     now, base = state.now, state.now.base
-    if any(on_the_way(each.place, each.effect) for each in now.effects):
+    on_way = any(on_the_way(each.place, each.effect) for each in now.effects)
+    if on_way or not now.runs.scans_told:
         return found
     for i, declared in enumerate(declared_noise(base.run.model)):
         fit = base.noise[i]
