@@ -9,7 +9,6 @@ MARGIN = 10.0  # BIC by which an effect must beat no effect and its best rival
 SURE = 2.0 * MARGIN  # BIC above the margin: there is a gap, even where no effect can be named
 MAJORITY = 0.5  # of a thing: more is most of it
 NEARLY_ALL = 0.9  # of a thing
-MATTERS = 0.2  # of the gap, that what is added has to close by itself, and a noise has to be
 SETTLED = 0.01  # BIC: a search gains no more
 QUARTER = 0.25  # of a quantity
 SLIGHT = 0.05  # of a quantity: a smaller part does not matter

@@ -202,10 +202,9 @@ class SlewCandidate(OneFigure):
 
     def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
         stems = super().stems(run, points, from_measured=from_measured)
-        if points.shape[1] > 2:
-            late = (0.5 + points[:, 2]) * not_yet_moved(run, stems, points[:, 0])
-            stems = stems - late
-        return stems
+        if points.shape[1] < 3:
+            return stems
+        return stems - (0.5 + points[:, 2]) * not_yet_moved(run, stems, points[:, 0])
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)

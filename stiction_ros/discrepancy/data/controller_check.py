@@ -81,7 +81,7 @@ def unseen_of(
         check: of the controller.
         drawn_in: whether OP is drawn in between the samples, as the loop shows a second scan.
     """
-    asked = scans_in_doubt(runs, check)
+    asked = in_doubt(runs, check)
     found = []
     for op in runs.op.T:
         moves = np.concatenate([np.diff(op[rows]) for rows in runs.slices])
@@ -99,12 +99,11 @@ def unseen_of(
     return tuple(found)
 
 
-def scans_in_doubt(runs: Runs, check: ControllerCheck) -> bool:
+def in_doubt(runs: Runs, check: ControllerCheck) -> bool:
     """Tell whether a controller may have scanned again between samples, which no law shows."""
     untold = any(record.sp is None for record in runs.records)
     given = check.status in (ControllerStatus.NOT_ASKED, ControllerStatus.OTHER) and not untold
-    asked = not given and check.left > NEGLIGIBLE and check.scans is None
-    return asked or check.between
+    return check.between or (not given and check.left > NEGLIGIBLE and check.scans is None)
 
 
 def _kept(op: FloatArray, slices: Sequence[slice]) -> float:

@@ -6,11 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.data.controller_check import (
-    check_controller,
-    scans_in_doubt,
-    unseen_of,
-)
+from stiction_ros.discrepancy.data.controller_check import check_controller, in_doubt, unseen_of
 from stiction_ros.discrepancy.data.gate import DataFinding, open_gate
 from stiction_ros.discrepancy.data.scans import drawn_in
 from stiction_ros.discrepancy.decision.explanation import Explanation
@@ -67,32 +63,28 @@ def begin(
     if runs is not base.run.runs:
         base = Baseline.of(FreeRun(model, runs))
     state = State(given=bare, before=base, now=Explanation(bare, base))
-    if options.process_fitted or not scans_in_doubt(runs, controller):
-        return task, state
-    return _scanned(task, state)
+    asked = in_doubt(runs, controller) and not options.process_fitted
+    return _scanned(task, state) if asked else (task, state)
 
 
 def _scanned(task: Task, state: State) -> tuple[Task, State]:
-    """Return the records with a second scan in each sample, where all explains more by it.
+    """Return the records with a second scan in each sample, where the loop shows it.
 
-    Where nothing tells whether a controller scans again between two samples, the loop does.
+    No law of the controller tells it there; all that may be found has to explain more by it.
     """
     unseen = unseen_of(task.runs, task.controller, drawn_in=True)
-    runs = dataclasses.replace(drawn_in(task.runs), unseen=unseen)
-    twice = dataclasses.replace(task, runs=runs)
-    base = Baseline.of(FreeRun(task.model, runs))
-    if base.score >= state.before.score:
-        return task, state
-    other = State(given=state.given, before=base, now=Explanation(state.given, base))
-    return (twice, other) if _least(twice, other) < _least(task, state) else (task, state)
+    twice = dataclasses.replace(task, runs=drawn_in(task.runs, unseen))
+    base = Baseline.of(FreeRun(task.model, twice.runs))
+    other = dataclasses.replace(state, before=base, now=Explanation(state.given, base))
+    better = base.score < state.before.score and _least(twice, other) < _least(task, state)
+    return (twice, other) if better else (task, state)
 
 
 def _least(task: Task, state: State) -> float:
     """Return the worth of no change of the model, of one effect or another process, if better."""
-    margin = task.options.margin
-    effects = [fit.evidence for fit in scored_by(task, state, 0).fits if fit.candidate.inside]
-    process = with_process(task, state, ())
-    least = state.before.score - max(margin, *effects) + margin
+    margin, process = task.options.margin, with_process(task, state, ())
+    gained = [f.evidence - margin for f in scored_by(task, state, 0).fits if f.candidate.inside]
+    least = state.before.score - max(0.0, *gained)
     return least if process is None else min(least, process.worth(margin))
 
 

@@ -38,7 +38,7 @@ from stiction_ros.discrepancy.gap.measure import (
 )
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.measures import MATTERS, SLIGHT
+from stiction_ros.discrepancy.measures import SLIGHT
 from stiction_ros.discrepancy.process.change import open_figures
 from stiction_ros.discrepancy.steps.look import explained
 from stiction_ros.discrepancy.steps.settle import settle
@@ -46,6 +46,7 @@ from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.effects import FloatArray
 
 SOME_STEPS = 3.0  # of the rounding, that a noise which has a law has to span
+MATTERS = 0.2  # of the gap, that an effect has to close by itself, and a noise that is left to be
 
 
 def closing(task: Task, looked: State) -> Discrepancy:

@@ -4,13 +4,12 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 
-from stiction_ros.discrepancy.answer.found_effects import own_closed
 from stiction_ros.discrepancy.decision.decide import large_enough
 from stiction_ros.discrepancy.decision.explanation import AddedEffect, Explanation, ProcessChange
 from stiction_ros.discrepancy.decision.scores import Scores
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.measures import MATTERS, NEGLIGIBLE, TRIED
+from stiction_ros.discrepancy.measures import NEGLIGIBLE, TRIED
 from stiction_ros.discrepancy.process.change import changed_process
 from stiction_ros.discrepancy.simulation.equation import GAIN
 from stiction_ros.discrepancy.steps.state import State, Task
@@ -55,16 +54,7 @@ def with_process(task: Task, state: State, part: Sequence[AddedEffect]) -> Expla
     """
     grounds = (True, False) if any(declared_noise(state.given)) else (False,)
     found = [changed_process(state.given, task.runs, part, declared) for declared in grounds]
-    return _best(task, [each for each in found if each is not None and _matters(state, each)])
-
-
-def _matters(state: State, found: Explanation) -> bool:
-    """Tell whether a changed process closes by itself what an effect has to close.
-
-    The given process is asked with the figures that the effects have beside the changed one.
-    """
-    without = Explanation.of(state.given, found.runs, found.effects)
-    return own_closed(without.base, found.base, dated=False, given=True) >= MATTERS
+    return _best(task, found)
 
 
 def _best(task: Task, found: Sequence[Explanation | None]) -> Explanation | None:
@@ -97,7 +87,7 @@ def mended(task: Task, state: State) -> State | None:
     parts = [(), *((each,) for each in added or alone)]
     parts += [added] if len(added) > 1 else []
     found = _best(task, [with_process(task, state, part) for part in parts])
-    due = margin if added else max([0.0, *(each.fit.evidence - margin for each in alone)])
+    due = margin if added else max((each.fit.evidence - margin for each in alone), default=0.0)
     if found is None or found.worth(margin) >= state.now.worth(margin) - due:
         return None
     names = [each.effect for each in added] or _left_in_doubt(state)

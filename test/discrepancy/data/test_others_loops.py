@@ -142,6 +142,28 @@ def test_a_lag_that_moves_on_between_samples_is_told_from_another_process(seed: 
 
 
 @pytest.mark.trial
+@pytest.mark.parametrize(
+    ("seed", "effect"),
+    [
+        (79189, "slew"),  # between samples, searched as a dead time before
+        (78520, "slew"),
+        (79378, "stiction"),  # a second scan, OP rounded and no tuning known
+    ],
+)
+def test_what_moves_between_samples_is_no_other_process(seed: int, effect: str) -> None:
+    answer = answered(seed)
+    assert names(answer) == [("valve:V1", effect)]
+    assert answer.process_changes == ()
+
+
+@pytest.mark.trial
+def test_a_second_scan_that_leaves_half_a_percent_of_the_moves_is_told() -> None:
+    answer = answered(79333)  # a curve in a tight loop
+    assert answer.process_changes == ()
+    assert ("valve:V1", "characteristic") in names(answer)
+
+
+@pytest.mark.trial
 def test_a_curve_is_stepped_with_the_process_that_stands_in_for_it() -> None:
     answer = answered(302, given="off")
     assert names(answer) == [("valve:V1", "characteristic")]
