@@ -76,8 +76,10 @@ def _scanned(task: Task, state: State) -> tuple[Task, State]:
     twice = dataclasses.replace(task, runs=drawn_in(task.runs, unseen))
     base = Baseline.of(FreeRun(task.model, twice.runs))
     other = dataclasses.replace(state, before=base, now=Explanation(state.given, base))
-    better = base.score < state.before.score and _least(twice, other) < _least(task, state)
-    return (twice, other) if better else (task, state)
+    if base.score > state.before.score:
+        return task, state
+    gained = _least(task, state) - _least(twice, other)
+    return (twice, other) if gained > task.options.margin else (task, state)
 
 
 def _least(task: Task, state: State) -> float:
