@@ -142,17 +142,10 @@ def test_a_lag_that_moves_on_between_samples_is_told_from_another_process(seed: 
 
 
 @pytest.mark.trial
-@pytest.mark.parametrize(
-    ("seed", "effect"),
-    [
-        (79189, "slew"),  # between samples, searched as a dead time before
-        (78520, "slew"),
-        (79378, "stiction"),  # a second scan, OP rounded and no tuning known
-    ],
-)
-def test_what_moves_between_samples_is_no_other_process(seed: int, effect: str) -> None:
+@pytest.mark.parametrize("seed", [79189, 78520])  # a dead time and a time constant before
+def test_a_slew_between_samples_is_no_other_process(seed: int) -> None:
     answer = answered(seed)
-    assert names(answer) == [("valve:V1", effect)]
+    assert names(answer) == [("valve:V1", "slew")]
     assert answer.process_changes == ()
 
 
