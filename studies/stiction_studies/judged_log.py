@@ -1,4 +1,4 @@
-"""What benches over many seeds share: which seeds, and a log of every loop that was judged."""
+"""A log of every loop that a bench judged."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -6,26 +6,22 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from stiction_ros.errors import InputError, storing
+from stiction_ros.texts import json_text
 
 Row = TypeVar("Row")
-
-
-def check_seeds(first: int, loops: int) -> None:
-    """Check the first seed and the number of loops.
-
-    Raises:
-        InputError: no loop at all, or a negative seed.
-    """
-    if loops < 1:
-        raise InputError(f"{loops} loops", where="--loops", fix="use 1 up")
-    if first < 0:
-        raise InputError(f"{first} is negative", where="--first")
 
 
 def start_log(path: Path) -> None:
     """Begin an empty log."""
     with storing(path):
         path.write_text("", encoding="utf-8")
+
+
+def keep_row(path: Path, full: bool, row: Mapping[str, Any]) -> None:
+    """Add a row to a log in one write: workers share the file."""
+    line = json_text({"full": full} | dict(row), indent=None) + "\n"
+    with storing(path), path.open("ab", buffering=0) as file:
+        file.write(line.encode())
 
 
 def logged_rows(path: Path, full: bool, row_of: Callable[[Mapping[str, Any]], Row]) -> list[Row]:

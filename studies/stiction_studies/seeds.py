@@ -21,6 +21,12 @@ def add_jobs(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_seeds(parser: argparse.ArgumentParser, first: int, last: int) -> None:
+    """Add the option that says which seeds are run, unless ``first`` to ``last``."""
+    said, default = f"seeds from A to B ({first}:{last})", (first, last)
+    parser.add_argument("--seeds", type=seed_range, default=default, metavar="A:B", help=said)
+
+
 def seed_range(text: str) -> tuple[int, int]:
     """Return ``A:B`` (or one number) as an inclusive range."""
     low, _, high = text.partition(":")

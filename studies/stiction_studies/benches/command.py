@@ -27,13 +27,7 @@ from stiction_studies.commands import choices
 OPTIONS: dict[str, tuple[str, ...]] = {
     "control": ("seed", "quick"),
     "identification": (
-        "repeat",
-        "seed",
-        "longest",
-        "quick",
-        "friction_limit",
-        "starts",
-        "grid_step",
+        *("repeat", "seed", "longest", "quick", "friction_limit", "starts", "grid_step"),
     ),
     "gap": ("family", "first", "loops", "full", "jobs", "log", "resume", "write"),
     "world": ("family", "given", "first", "loops", "full", "jobs", "log", "resume", "write"),

@@ -26,15 +26,8 @@ from stiction_studies.blind.scores.scoring import Score, score
 SAMPLES, ONSET = 6000, 3000
 # Process kinds by how often they are drawn; delays are put before a valve that is alone.
 LATE_CAUSES = (
-    "valve stiction",
-    "valve backlash",
-    "valve slew",
-    "valve lag",
-    "valve saturation",
-    "process delay",
-    "disturbance step",
-    "sensor bias_step",
-    "sensor lag",
+    *("valve stiction", "valve backlash", "valve slew", "valve lag", "valve saturation"),
+    *("process delay", "disturbance step", "sensor bias_step", "sensor lag"),
 )
 
 

@@ -15,7 +15,7 @@ from stiction_ros.cli.shared.scenarios import find
 from stiction_ros.effects import Behaviour, HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import ValveChange
-from stiction_studies.seeds import add_jobs, run_seeds, seed_range
+from stiction_studies.seeds import add_jobs, add_seeds, run_seeds
 
 if TYPE_CHECKING:
     from stiction_ros.online.session import LiveRun, Scenario
@@ -58,13 +58,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--change", choices=CHANGES, default="serviced", help="how the valve changes (serviced)"
     )
-    parser.add_argument(
-        "--seeds",
-        type=seed_range,
-        default=(11, 30),
-        metavar="A:B",
-        help="seeds from A to B (11:30)",
-    )
+    add_seeds(parser, 11, 30)
     add_jobs(parser)
     parser.add_argument("--json", metavar="F", help="write every run; - for stdout")
     parser.set_defaults(run=run)

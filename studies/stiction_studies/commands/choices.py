@@ -10,16 +10,7 @@ COUNTED = METHODS  # methods that ``stiction paper --success`` counts
 FIGURES = (2, 3, 5, 6)  # 1 and 4 are schemes
 # exhibits of the paper
 TABLES = (
-    "1",
-    "2",
-    "A.3",
-    "times",
-    "wells",
-    "success",
-    "laws",
-    "retuning",
-    "ablation",
-    "identified",
+    *("1", "2", "A.3", "times", "wells", "success", "laws", "retuning", "ablation", "identified"),
 )
 NOISES = ("measurement", "equation")  # where noise enters Example 1
 PLANTS = ("linear", "tank")  # plants of Example 2
@@ -37,17 +28,7 @@ GIVEN = ("exact", "off")
 
 # what is not as known in ``study-control``
 CONTROL_CASES = (
-    "nominal",
-    "own_weights",
-    "both_20_low",
-    "both_20_high",
-    "low_and_high",
-    "high_and_low",
-    "true_50_more",
-    "known_50_more",
-    "C_B",
-    "T_A",
-    "F_B",
-    "two_valves",
+    *("nominal", "own_weights", "both_20_low", "both_20_high", "low_and_high"),
+    *("high_and_low", "true_50_more", "known_50_more", "C_B", "T_A", "F_B", "two_valves"),
 )
 MANY = 6  # slips from which on a valve of the field has many

@@ -22,17 +22,8 @@ if TYPE_CHECKING:
 LABELS = ("", "PV")  # heads of the columns of words
 SEEDS = (101, 103)
 OPTIONS = (
-    "plant",
-    "seeds",
-    "preset",
-    "warm_start",
-    "programme_cost",
-    "law",
-    "known",
-    "schedule",
-    "hold",
-    "jobs",
-    "json",
+    *("plant", "seeds", "preset", "warm_start", "programme_cost", "law", "known", "schedule"),
+    *("hold", "jobs", "json"),
 )
 FOLDER = "tank_compare"
 

@@ -13,7 +13,7 @@ from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.errors import InputError
 from stiction_ros.signals.holds import holds
 from stiction_studies.commands import choices
-from stiction_studies.seeds import add_jobs, run_seeds, seed_range
+from stiction_studies.seeds import add_jobs, add_seeds, run_seeds
 
 if TYPE_CHECKING:
     from stiction_studies.examples.control_cases import ControlOutcome
@@ -60,13 +60,7 @@ def add(commands: Any) -> None:
         "and compare the noise-free outputs with the loop without stiction. Exit code 1 when a "
         "case misses what is asked of it.",
     )
-    parser.add_argument(
-        "--seeds",
-        type=seed_range,
-        default=(101, 110),
-        metavar="A:B",
-        help="seeds from A to B (101:110)",
-    )
+    add_seeds(parser, 101, 110)
     known = ", ".join(choices.CONTROL_CASES)
     parser.add_argument("--cases", metavar="A,B", help=f"some of {known}")
     add_jobs(parser)

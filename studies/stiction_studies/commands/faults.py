@@ -143,14 +143,8 @@ def _print(outcomes: "Sequence[Outcome]") -> None:
     console = Console()
     shown = Table(
         Column("fault", overflow="fold", min_width=24),
-        "pace",
-        "swap",
-        "OP beyond, %",
-        "without OP, s",
-        "noticed, s",
-        "recovered, s",
-        "bag",
-        "verdict",
+        *("pace", "swap", "OP beyond, %", "without OP, s", "noticed, s", "recovered, s"),
+        *("bag", "verdict"),
     )
     for one in outcomes:
         recovered = "ended" if one.ended else shown_seconds(one.recovered)

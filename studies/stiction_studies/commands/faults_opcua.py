@@ -72,16 +72,8 @@ def _print(outcomes: "Sequence[BridgeOutcome]") -> None:
     console = Console(width=None if sys.stdout.isatty() else WIDE)
     shown = Table(
         Column("fault", overflow="fold", min_width=24),
-        "OPs (limited)",
-        "no grant",
-        "beyond, %",
-        "refused",
-        "PI after, s",
-        "step, %",
-        "told, s",
-        "back, s",
-        "not in bag",
-        "verdict",
+        *("OPs (limited)", "no grant", "beyond, %", "refused", "PI after, s", "step, %"),
+        *("told, s", "back, s", "not in bag", "verdict"),
     )
     for one in outcomes:
         shown.add_row(

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_studies.seeds import add_jobs, run_seeds, seed_range
+from stiction_studies.seeds import add_jobs, add_seeds, run_seeds
 
 if TYPE_CHECKING:
     from stiction_ros.online.monitor.gap_monitor import MonitorRule
@@ -24,13 +24,7 @@ def add(commands: Any) -> None:
         description="Run the monitor over long loops drawn by seed. From the middle on one effect "
         "acts, or none with --healthy. Print alarms and what was named.",
     )
-    parser.add_argument(
-        "--seeds",
-        type=seed_range,
-        default=(10000, 10019),
-        metavar="A:B",
-        help="seeds from A to B (10000:10019)",
-    )
+    add_seeds(parser, 10000, 10019)
     parser.add_argument("--healthy", action="store_true", help="loops in which no effect sets in")
     parser.add_argument(
         "--false-alarm", type=float, metavar="P", help="monitor_false_alarm (as the node)"

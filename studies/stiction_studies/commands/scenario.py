@@ -10,7 +10,7 @@ from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.cli.shared.scenarios import find
-from stiction_studies.seeds import add_jobs, run_seeds, seed_range
+from stiction_studies.seeds import add_jobs, add_seeds, run_seeds
 
 if TYPE_CHECKING:
     from stiction_ros.online.session import Scenario
@@ -52,13 +52,7 @@ def add(commands: Any) -> None:
         "was not swapped, one with ideal valves was, or a wrong one of several named or trusted.",
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="a scenario of demo, or a file")
-    parser.add_argument(
-        "--seeds",
-        type=seed_range,
-        default=(11, 20),
-        metavar="A:B",
-        help="seeds from A to B (11:20)",
-    )
+    add_seeds(parser, 11, 20)
     parser.add_argument("--ideal-valves", action="store_true", help="valves that follow OP")
     add_jobs(parser)
     parser.add_argument("--json", metavar="F", help="write all summaries; - for stdout")

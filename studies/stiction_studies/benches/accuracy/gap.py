@@ -3,23 +3,20 @@
 import argparse
 import dataclasses
 import functools
-import json
+import itertools
 import math
-import multiprocessing
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.cli.shared.progress import bar
-from stiction_ros.orphans import spared
+from stiction_ros.errors import InputError
 from stiction_studies.commands import choices
-from stiction_studies.judged_log import check_seeds, logged_rows, start_log
-from stiction_studies.seeds import drop
+from stiction_studies.judged_log import keep_row, logged_rows, start_log
+from stiction_studies.seeds import run_each
 
 if TYPE_CHECKING:
     from stiction_studies.blind.scores.scoring import Scored
@@ -28,6 +25,7 @@ if TYPE_CHECKING:
 FIRST_SEED = 10_000  # seeds below 1000 are for tuning
 LOOPS = 20
 LOG = "bench_gap.jsonl"
+Row = TypeVar("Row")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,14 +37,31 @@ class GapBench:
     loops: int = LOOPS  # seeds of every family, from the first on
     full: bool = False  # bootstraps instead of stored thresholds
 
+    @classmethod
+    def of(cls, options: argparse.Namespace) -> Self:
+        """Return what options ask for."""
+        lists = {"families": options.family, "givens": options.given}
+        given = vars(options) | {key: tuple(dict.fromkeys(v)) for key, v in lists.items() if v}
+        names = (each.name for each in dataclasses.fields(cls))
+        return cls(**{name: given[name] for name in names if given.get(name) is not None})
+
     def __post_init__(self) -> None:
-        check_seeds(self.first, self.loops)
+        if self.loops < 1:
+            raise InputError(f"{self.loops} loops", where="--loops", fix="use 1 up")
+        if self.first < 0:
+            raise InputError(f"{self.first} is negative", where="--first")
+
+    keys: ClassVar[tuple[str, ...]] = ("family", "seed")  # of a row, by which a loop is known
 
     @property
-    def cases(self) -> list[tuple[str, int]]:
+    def cases(self) -> list[tuple[Any, ...]]:
         """Family and seed of every loop."""
-        seeds = range(self.first, self.first + self.loops)
-        return [(family, seed) for family in self.families for seed in seeds]
+        return list(itertools.product(self.families, self.seeds))
+
+    @property
+    def seeds(self) -> range:
+        """Seeds of each family."""
+        return range(self.first, self.first + self.loops)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -76,74 +91,71 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the benchmark."""
+    from stiction_studies.blind.scores.scoring import Scored
     from stiction_studies.blind.scores.tally import report
 
-    chosen = {
-        "families": tuple(dict.fromkeys(options.family)) if options.family else None,
-        "first": options.first,
-        "loops": options.loops,
-        "full": options.full,
-    }
-    bench = GapBench(**{key: value for key, value in chosen.items() if value is not None})
+    bench = GapBench.of(options)
     if options.write is not None:
         write_loops(bench, Path(options.write))
         return 0
-    log = Path(options.log or LOG)
-    rows = read_log(log, bench) if options.resume else {}
-    todo = [case for case in bench.cases if case not in rows]
-    if not options.resume:
-        start_log(log)
-    judge_all(todo, bench.full, options.jobs or 1, functools.partial(_keep, rows, log, bench.full))
-    ordered = [rows[case] for case in bench.cases]
-    hand_over(options.json, {"name": "gap"} | report(ordered), lambda: show(ordered))
+    rows = judged_rows(bench, options, LOG, Scored.from_mapping, judge)
+    hand_over(options.json, {"name": "gap"} | report(rows), lambda: show(rows))
     return 0
 
 
-def judge(family: str, seed: int, full: bool) -> "Scored":
+def judged_rows(
+    bench: "GapBench",
+    options: argparse.Namespace,
+    log: str,
+    row_of: Callable[[Mapping[str, Any]], Row],
+    judge: Callable[[bool, Path, Any], Row],
+) -> list[Row]:
+    """Return the row of every loop, of the log or judged now by worker processes, in their order.
+
+    Args:
+        bench: which loops.
+        options: of the command.
+        log: name of the log where none is given.
+        row_of: makes a row of what the log has.
+        judge: makes it of a loop and keeps it there.
+    """
+    path = Path(options.log or log)
+    rows = read_log(path, bench, row_of) if options.resume else {}
+    todo = [case for case in bench.cases if case not in rows]
+    if not options.resume:
+        start_log(path)
+    work = functools.partial(judge, bench.full, path)
+    judged = run_each(work, todo, options.jobs or 1, f"{len(todo)} loops")
+    rows |= dict(zip(todo, judged, strict=True))
+    return [rows[case] for case in bench.cases]
+
+
+def judge(full: bool, log: Path, case: tuple[str, int]) -> "Scored":
     """Run the workflow on one blind loop and compare; it sees model and record alone."""
     from stiction_ros.discrepancy import GapOptions, find_discrepancy
     from stiction_studies.blind.loops.generator import blind_loop
     from stiction_studies.blind.scores.scoring import score
     from stiction_studies.blind.testable import gains_beyond_margin
 
+    family, seed = case
     seen, truth = blind_loop(seed, family)
     found = find_discrepancy(seen.model, [seen.record], GapOptions(quick=not full))
-    return score(truth, seen.model, found.to_dict(), gains_beyond_margin(seen, truth))
+    row = score(truth, seen.model, found.to_dict(), gains_beyond_margin(seen, truth))
+    keep_row(log, full, row.to_mapping())
+    return row
 
 
-def judge_all(
-    cases: list[tuple[str, int]], full: bool, jobs: int, keep: "Callable[[Scored], None]"
-) -> None:
-    """Judge loops in worker processes and hand over every row as it comes."""
-    if not cases:
-        return
-    context = multiprocessing.get_context("spawn")
-    with (
-        bar(f"{len(cases)} blind loops") as show_share,
-        ProcessPoolExecutor(max(jobs, 1), mp_context=context) as pool,
-    ):
-        with spared():  # the first case starts the workers
-            futures = [pool.submit(judge, family, seed, full) for family, seed in cases]
-        try:
-            for done, future in enumerate(as_completed(futures), start=1):
-                keep(future.result())
-                show_share(done / len(futures))
-        except BaseException:
-            drop(pool)
-            raise
-
-
-def read_log(path: Path, bench: GapBench) -> "dict[tuple[str, int], Scored]":
+def read_log(
+    path: Path, bench: "GapBench", row_of: Callable[[Mapping[str, Any]], Row]
+) -> dict[tuple[Any, ...], Row]:
     """Return the rows of ``bench`` that the log has.
 
     Raises:
         InputError: a line that is no row.
     """
-    from stiction_studies.blind.scores.scoring import Scored
-
-    wanted = set(bench.cases)
-    rows = logged_rows(path, bench.full, Scored.from_mapping)
-    return {(row.family, row.seed): row for row in rows if (row.family, row.seed) in wanted}
+    rows = logged_rows(path, bench.full, row_of)
+    by_case = {tuple(getattr(row, key) for key in bench.keys): row for row in rows}
+    return {case: by_case[case] for case in bench.cases if case in by_case}
 
 
 def write_loops(bench: GapBench, folder: Path) -> None:
@@ -164,12 +176,6 @@ def show(rows: "Iterable[Scored]") -> None:
     console.print(matrix_table(matrix(rows)))
     console.print(rate_table([*rates(rows), *coverage(rows)]))
     console.print(f"closed by what was right, median: {median_closed(rows):.3f} (>= 0.9)")
-
-
-def _keep(rows: "dict[tuple[str, int], Scored]", log: Path, full: bool, row: "Scored") -> None:
-    rows[row.family, row.seed] = row
-    with log.open("a", encoding="utf-8") as file:
-        file.write(json.dumps({"full": full} | row.to_mapping()) + "\n")
 
 
 def matrix_table(counts: Mapping[str, Mapping[str, int]]) -> Table:

@@ -2,11 +2,11 @@
 
 import argparse
 import dataclasses
-import functools
+import itertools
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from rich.console import Console
 from rich.table import Table
@@ -14,33 +14,29 @@ from rich.table import Table
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.errors import InputError, storing
 from stiction_ros.texts import json_text
-from stiction_studies.benches.accuracy.gap import matrix_table, rate_table
+from stiction_studies.benches.accuracy.gap import GapBench, judged_rows, matrix_table, rate_table
 from stiction_studies.commands import choices
-from stiction_studies.judged_log import check_seeds, logged_rows, start_log
-from stiction_studies.seeds import run_each
+from stiction_studies.judged_log import keep_row
 
 if TYPE_CHECKING:
     from stiction_studies.blind.scores.world_scores import WorldScore
 
 FIRST_SEED = 100_000  # seeds below 1000 are for tuning
-LOOPS = 20
 LOG = "bench_world.jsonl"
 
 Case = tuple[str, str, int]  # family, kind of model, seed
 
 
 @dataclasses.dataclass(frozen=True)
-class WorldBench:
-    """What is run."""
+class WorldBench(GapBench):
+    """What is run: the same with one kind of model or several."""
 
-    families: tuple[str, ...] = ("single",)
-    givens: tuple[str, ...] = ("exact",)
     first: int = FIRST_SEED
-    loops: int = LOOPS  # seeds of each family and model, from the first on
-    full: bool = False  # bootstraps instead of stored thresholds
+    givens: tuple[str, ...] = ("exact",)
+    keys: ClassVar[tuple[str, ...]] = ("family", "given", "seed")
 
     def __post_init__(self) -> None:
-        check_seeds(self.first, self.loops)
+        super().__post_init__()
         if "outside" in self.families:
             raise InputError(
                 "no loop of the field lies outside the catalogue",
@@ -55,8 +51,7 @@ class WorldBench:
     @property
     def cases(self) -> list[Case]:
         """Family, kind of model and seed of every loop."""
-        seeds = range(self.first, self.first + self.loops)
-        return [(f, g, seed) for f in self.families for g in self.givens for seed in seeds]
+        return list(itertools.product(self.families, self.givens, self.seeds))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -74,33 +69,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, machine: str) -> int:
     """Run the benchmark."""
     from stiction_studies.blind import wrong_process
+    from stiction_studies.blind.scores.world_scores import WorldScore
     from stiction_studies.blind.scores.world_tally import report
 
-    chosen = {
-        "families": tuple(dict.fromkeys(options.family)) if options.family else None,
-        "givens": tuple(dict.fromkeys(options.given)) if options.given else None,
-        "first": options.first,
-        "loops": options.loops,
-        "full": options.full,
-    }
-    bench = WorldBench(**{key: value for key, value in chosen.items() if value is not None})
+    bench = WorldBench.of(options)
     if bench.families == (choices.PROCESS,):
         return wrong_process.run(bench.first, bench.loops, options)
     if options.write is not None:
         write_loops(bench, Path(options.write))
         return 0
-    log = Path(options.log or LOG)
-    rows = _read_log(log, bench) if options.resume else {}
-    if not options.resume:
-        start_log(log)
-    todo = [case for case in bench.cases if case not in rows]
-    judged = run_each(
-        functools.partial(judge, bench.full, log), todo, options.jobs or 1, f"{len(todo)} loops"
-    )
-    rows |= dict(zip(todo, judged, strict=True))
-    ordered = [rows[case] for case in bench.cases]
+    rows = judged_rows(bench, options, LOG, WorldScore.from_mapping, judge)
     hand_over(
-        options.json, {"name": "world", "machine": machine} | report(ordered), lambda: show(ordered)
+        options.json, {"name": "world", "machine": machine} | report(rows), lambda: show(rows)
     )
     return 0
 
@@ -120,9 +100,7 @@ def judge(full: bool, log: Path, case: Case) -> "WorldScore":
     found = find_discrepancy(model, [loop.record], GapOptions(quick=not full))
     seconds = time.process_time() - begun
     row = score(loop, given, found.to_dict(), oracle(loop), seconds)
-    line = json_text({"full": full} | row.to_mapping(), indent=None) + "\n"
-    with log.open("ab", buffering=0) as file:  # one write: workers share the file
-        file.write(line.encode())
+    keep_row(log, full, row.to_mapping())
     return row
 
 
@@ -178,12 +156,3 @@ def _misses(rows: "Sequence[WorldScore]") -> Table:
             place = " ".join((row.plant, *row.circumstances))
             table.add_row(str(row.seed), row.cause, row.said, gains, place)
     return table
-
-
-def _read_log(log: Path, bench: WorldBench) -> "dict[Case, WorldScore]":
-    """Return the rows of ``bench`` that the log has."""
-    from stiction_studies.blind.scores.world_scores import WorldScore
-
-    rows = logged_rows(log, bench.full, WorldScore.from_mapping)
-    by_case = {(row.family, row.given, row.seed): row for row in rows}
-    return {case: by_case[case] for case in bench.cases if case in by_case}

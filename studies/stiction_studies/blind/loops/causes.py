@@ -234,10 +234,6 @@ CAUSES: dict[str, Cause] = {
 }
 # Two at once that can be told apart: one from each list, of different traces.
 FIRST_OF_TWO = (
-    "valve stiction",
-    "valve backlash",
-    "process gain",
-    "process delay",
-    "valve characteristic",
+    *("valve stiction", "valve backlash", "process gain", "process delay", "valve characteristic"),
 )
 SECOND_OF_TWO = ("disturbance step", "disturbance drift", "disturbance sine")

@@ -45,8 +45,19 @@ class Claim:
     intervals: Mapping[str, tuple[float, float]]  # by effect, low and high end of its parameters
 
 
+class Row:
+    """A score that a log keeps."""
+
+    closed: float
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the JSON mapping; a missing ``closed`` is null."""
+        values: dict[str, Any] = dataclasses.asdict(self)  # type: ignore[call-overload]
+        return values | {"closed": None if math.isnan(self.closed) else self.closed}
+
+
 @dataclasses.dataclass(frozen=True)
-class Scored:
+class Scored(Row):
     """One loop, judged.
 
     Attributes:
@@ -70,12 +81,6 @@ class Scored:
     closed: float
     covered: Mapping[str, bool]
     seconds: float
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the JSON mapping; a missing ``closed`` is null."""
-        values = dataclasses.asdict(self)
-        values["closed"] = None if math.isnan(self.closed) else self.closed
-        return values
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> "Scored":

@@ -5,14 +5,13 @@ import math
 import re
 import time
 from pathlib import Path
-from typing import Any
 
 from stiction_studies.control_system.control_system import AUTO
 from stiction_studies.control_system.journal import Written
 from stiction_studies.faults.bridge.bridge_fault import BridgeFault
 from stiction_studies.faults.bridge.bridged_loop import WATCHDOG, BridgedLoop, NotSeenError
 from stiction_studies.faults.judgement.bag_check import check_bag
-from stiction_studies.faults.judgement.judge import wrong_in_logs
+from stiction_studies.faults.judgement.judge import Verdict, wrong_in_logs
 from stiction_studies.faults.judgement.notices import changes_told
 from stiction_studies.faults.observation import BagFound, Shown
 
@@ -39,7 +38,7 @@ class Seen:
 
 
 @dataclasses.dataclass(frozen=True)
-class BridgeOutcome:
+class BridgeOutcome(Verdict):
     """The verdict of one case."""
 
     fault: str  # its name
@@ -55,17 +54,6 @@ class BridgeOutcome:
     said: str  # what they said
     back: float | None  # s from the end of the fault until OPs were written again
     bag: BagFound  # messages that were heard, and those missing in the bag
-    reasons: tuple[str, ...] = ()  # why it fails; empty for a pass
-    seconds: float = 0.0  # that the case took
-
-    @property
-    def passed(self) -> bool:
-        """Whether everything is as expected."""
-        return not self.reasons
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values."""
-        return dataclasses.asdict(self) | {"passed": self.passed}
 
 
 def run_case(fault: BridgeFault, directory: Path, seed: int) -> BridgeOutcome:
@@ -168,7 +156,7 @@ def judge(fault: BridgeFault, seen: Seen) -> BridgeOutcome:
         said,
         again[0] - seen.mended if again else None,
         seen.bag,
-        tuple(reasons),
+        reasons=tuple(reasons),
     )
 
 

@@ -18,8 +18,25 @@ LOOP = ("plant", "controller", "estimator")
 SHARE = 0.1  # by which a known friction may differ after the fault
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What every case ends with."""
+
+    reasons: tuple[str, ...] = ()  # why it fails; empty for a pass
+    seconds: float = 0.0  # that the case took
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything is as expected."""
+        return not self.reasons
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values."""
+        return dataclasses.asdict(self) | {"passed": self.passed}
+
+
 @dataclasses.dataclass(frozen=True)
-class Outcome:
+class Outcome(Verdict):
     """The verdict of one case."""
 
     # fault, pace, phase: which
@@ -34,17 +51,6 @@ class Outcome:
     gone: float | None = None  # until the last of its diagnostics had ended, s; None for none
     ended: bool = False  # whether the loop ended with a clear sentence
     bag: bool = False  # whether the bag is as expected
-    reasons: tuple[str, ...] = ()  # why it fails; empty for a pass
-    seconds: float = 0.0  # that the case took
-
-    @property
-    def passed(self) -> bool:
-        """Whether everything is as expected."""
-        return not self.reasons
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values."""
-        return dataclasses.asdict(self) | {"passed": self.passed}
 
 
 def judge(fault: Fault, pace: Pace, seen: Observation, allowed: float) -> Outcome:
@@ -91,7 +97,7 @@ def judge(fault: Fault, pace: Pace, seen: Observation, allowed: float) -> Outcom
         shown[1],
         ending is not None,
         not bag,
-        tuple(reasons),
+        reasons=tuple(reasons),
     )
 
 

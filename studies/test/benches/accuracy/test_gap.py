@@ -18,8 +18,9 @@ SUBSET = (("single", 3), ("single", 201), ("single", 209), ("single", 212), ("ou
 
 
 @pytest.fixture(scope="module")
-def judged() -> list[Scored]:
-    return [judge(family, seed, False) for family, seed in SUBSET]
+def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Scored]:
+    log = tmp_path_factory.mktemp("gap") / "log.jsonl"
+    return [judge(False, log, case) for case in SUBSET]
 
 
 @pytest.mark.trial
@@ -79,12 +80,12 @@ def test_only_rows_of_the_same_benchmark_count(tmp_path: Path) -> None:
     log = tmp_path / "log.jsonl"
     write_log(log, [row(5), row(9), row(6, family="two")])
     bench = GapBench(first=5, loops=3)
-    assert set(read_log(log, bench)) == {("single", 5)}
-    assert not read_log(log, GapBench(first=5, loops=3, full=True))
+    assert set(read_log(log, bench, Scored.from_mapping)) == {("single", 5)}
+    assert not read_log(log, GapBench(first=5, loops=3, full=True), Scored.from_mapping)
 
 
 def test_without_a_log_nothing_is_done_yet(tmp_path: Path) -> None:
-    assert read_log(tmp_path / "none.jsonl", GapBench()) == {}
+    assert read_log(tmp_path / "none.jsonl", GapBench(), Scored.from_mapping) == {}
 
 
 @pytest.mark.parametrize("line", ["{", "[]", "{}", '{"full": false, "score": "lucky"}'])
@@ -92,7 +93,7 @@ def test_a_broken_log_is_named(line: str, tmp_path: Path) -> None:
     log = tmp_path / "log.jsonl"
     log.write_text(line + "\n", encoding="utf-8")
     with pytest.raises(InputError, match="line 1"):
-        read_log(log, GapBench())
+        read_log(log, GapBench(), Scored.from_mapping)
 
 
 def test_loops_and_answers_are_written_apart(tmp_path: Path) -> None:

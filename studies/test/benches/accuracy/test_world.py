@@ -57,7 +57,7 @@ def test_reporting_seeds_are_the_default() -> None:
 
 
 def test_every_family_and_model_has_the_same_seeds() -> None:
-    bench = WorldBench(("single", "two"), ("exact", "off"), 7, 1)
+    bench = WorldBench(("single", "two"), 7, 1, givens=("exact", "off"))
     assert bench.cases == [
         ("single", "exact", 7),
         ("single", "off", 7),
