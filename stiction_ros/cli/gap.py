@@ -127,19 +127,18 @@ def _write(found: "Discrepancy", directory: Path) -> None:
 def _print(found: "Discrepancy", command: str) -> None:
     """Print the answer; to the ``command`` that was given a further record may be added."""
     from stiction_ros.discrepancy import GapVerdict
-    from stiction_ros.report.gap_words import called, lines_of, plain
+    from stiction_ros.report.gap_words import called, lines_of, one_of, plain, titled
 
     console = Console()
     names = ", ".join(record.name for record in found.runs.records)
     console.print(f"{names}: {found.verdict}", markup=False)
     for effect in found.effects:
-        law = "" if effect.law is None else f" (law {effect.law})"
-        name = called(effect.place, effect.effect)
-        console.print(f"{name}{law}, ΔBIC {effect.delta_bic:.0f}", markup=False)
+        name = titled(effect, called(effect.place, effect.effect))
+        console.print(f"{name}, ΔBIC {effect.delta_bic:.0f}", markup=False)
         for line in lines_of(effect):
             console.print(f"  {plain(line)}", markup=False)
     if not found.effects and found.alternatives:
-        console.print("one of: " + ", ".join(called(*name) for name in found.alternatives))
+        console.print(f"one of: {one_of(found.alternatives, found.probabilities)}", markup=False)
     for change in found.process_changes:
         console.print(f"process to {change.output}: {change.sentence}", markup=False)
     console.print(_gaps(found))

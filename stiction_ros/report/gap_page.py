@@ -66,7 +66,7 @@ def _headline(found: Discrepancy) -> str:
     if not names and not found.alternatives and found.process_changes:
         return f"The process is another than the model: {'; '.join(change_lines(found))}"
     if not names:
-        names = [" or ".join(say.called(*name) for name in found.alternatives)]
+        names = [say.one_of(found.alternatives, found.probabilities)]
     return _HEADLINES[found.verdict].format(what=", and ".join(names))
 
 
@@ -220,13 +220,8 @@ def _track(found: Discrepancy, look: Look) -> str:
 def effect_card(effect: FoundEffect) -> str:
     """Return the box of one effect: place, law, figures with units, and why it."""
     kind = "bad" if effect.verdict is GapVerdict.NAMED else "open"
-    law = "" if effect.law is None else f" (law {effect.law})"
-    return card(
-        kind,
-        say.place_of(effect.place),
-        say.word_of(effect.effect) + law,
-        "\n".join(say.lines_of(effect)),
-    )
+    title = say.titled(effect, say.word_of(effect.effect))
+    return card(kind, say.place_of(effect.place), title, "\n".join(say.lines_of(effect)))
 
 
 def change_lines(found: Discrepancy) -> list[str]:

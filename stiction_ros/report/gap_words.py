@@ -2,9 +2,12 @@
 
 import math
 import re
+from collections.abc import Mapping, Sequence
 
 from stiction_ros.discrepancy import FoundEffect
+from stiction_ros.discrepancy.answer.say import PLACES
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus
+from stiction_ros.discrepancy.decision.probability import Name
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.effects import behaviours
 from stiction_ros.report.page import number
@@ -17,20 +20,11 @@ CONTROLLER = {
     ControllerStatus.UNEXPLAINED: "no PI controller gives the recorded OP from PV and SP",
     ControllerStatus.NOT_ASKED: "OP was not recomputed: that takes one valve, one output and SP",
 }
-_PLACES = {
-    "valve": "in valve {tag}",
+_SHORT = PLACES | {"disturbance": "the output {tag}"}
+_PLACES = {kind: f"in {place}" for kind, place in PLACES.items()} | {
     "load": "load that enters at valve {tag}",
-    "process": "in the process to {tag}",
     "disturbance": "disturbance on {tag}",
-    "sensor": "in the sensor of {tag}",
     "data": "in the record",
-}
-_SHORT = {
-    "valve": "valve {tag}",
-    "load": "the load at {tag}",
-    "process": "the process to {tag}",
-    "disturbance": "the output {tag}",
-    "sensor": "the sensor of {tag}",
 }
 _PLACE = re.compile(rf"\b({'|'.join(_SHORT)}):(\w+)")
 _FRICTION = re.compile(r"\bf_[sd]\b")
@@ -69,6 +63,23 @@ def called(place: str, effect: str) -> str:
     return f"{word_of(effect)} {place_of(place)}"
 
 
+def titled(effect: FoundEffect, name: str) -> str:
+    """Return a name with law and probability: ``stiction (law he), probability 97 %``."""
+    law = "" if effect.law is None else f" (law {effect.law})"
+    likely = effect.standing.probabilities()[effect.place, effect.effect]
+    return f"{name}{law}, probability {chance(likely)}"
+
+
+def one_of(names: Sequence[Name], probabilities: Mapping[Name, float]) -> str:
+    """Return the members of a set, such as ``lag in valve V1 (40 %) or …``."""
+    return " or ".join(f"{called(*name)} ({chance(probabilities[name])})" for name in names)
+
+
+def chance(probability: float) -> str:
+    """Return a probability for people, neither 0 nor 1."""
+    return f"{min(max(100.0 * probability, 1.0), 99.0):.0f} %"
+
+
 def figures_with_units(effect: FoundEffect) -> list[str]:
     """Return one line per figure: name, value, unit, interval and what it means."""
     meanings = {
@@ -98,7 +109,7 @@ def lines_of(effect: FoundEffect) -> list[str]:
     """Return what is said of an effect, one line each: figures, others like it, why it."""
     lines = figures_with_units(effect)
     if effect.alternatives:
-        others = " or ".join(called(*name) for name in effect.alternatives)
+        others = one_of(effect.alternatives, effect.standing.probabilities())
         lines.append(f"or {others}: these records do not tell them apart")
     if math.isfinite(effect.closed):
         lines.append(f"closes {100.0 * effect.closed:.0f} % of the gap by itself")

@@ -220,7 +220,7 @@ def _gap(model: Any, record: Any) -> Answer:
     return {
         "verdict": found["verdict"],
         "effects": [{key: effect[key] for key in keys} for effect in found["effects"]],
-        "alternatives": found["alternatives"],
+        "alternatives": [{key: each[key] for key in keys[:2]} for each in found["alternatives"]],
         "process_changes": found["process_changes"],
         "gap": found["gap"],
     }

@@ -8,6 +8,7 @@ from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.data.gate import DataFinding
 from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
+from stiction_ros.discrepancy.decision.probability import Name, Standing
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.uncertainty import Intervals
 from stiction_ros.discrepancy.gap.measure import Shrunk, gone_share, rms
@@ -32,6 +33,13 @@ class FoundEffect:
     # places and effects that the record does not tell from it
     alternatives: tuple[tuple[str, str], ...] = ()
     sentence: str = ""  # why this effect was named, and not a rival
+    stands: Standing | None = None  # how far it is ahead; None where ``delta_bic`` tells it
+
+    @property
+    def standing(self) -> Standing:
+        """How far it is ahead, or one of those that are not told from it."""
+        names = ((self.place, self.effect), *self.alternatives)
+        return self.stands or Standing(self.delta_bic, dict.fromkeys(names, self.delta_bic))
 
     @property
     def effect(self) -> str:
@@ -62,6 +70,7 @@ class FoundEffect:
 
     def to_dict(self) -> dict[str, object]:
         """Return the entry of ``effects`` in ``gap --json``."""
+        likely = self.standing.probabilities()
         return {
             "place": self.place,
             "effect": self.effect,
@@ -72,9 +81,15 @@ class FoundEffect:
             "delta_bic": self.delta_bic,
             "closed": None if math.isnan(self.closed) else self.closed,
             "verdict": self.verdict.value,
-            "alternatives": [{"place": p, "effect": e} for p, e in self.alternatives],
+            "probability": likely[self.place, self.effect],
+            "alternatives": listed_names(self.alternatives, likely),
             "sentence": self.sentence,
         }
+
+
+def listed_names(names: Sequence[Name], probabilities: Mapping[Name, float]) -> list[object]:
+    """Return an entry ``alternatives`` of ``gap --json``."""
+    return [{"place": n[0], "effect": n[1], "probability": probabilities[n]} for n in names]
 
 
 def of_data(finding: DataFinding) -> FoundEffect:
@@ -101,6 +116,10 @@ def of_noise(laws: Sequence[NoiseEffect], declared: float, margin: float) -> Fou
         alternatives=tuple((each.place, each.behaviour.effect) for each in others),
         sentence="What no other effect explains wanders without a relation to OP, more than the "
         "noise that the model declares",
+        stands=Standing(
+            declared - best.score,
+            {(e.place, e.behaviour.effect): declared - e.score for e in (best, *others)},
+        ),
     )
 
 

@@ -1,15 +1,16 @@
 """What the workflow hands over, and which behaviours it did not consider, and why."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from stiction_ros.discrepancy.answer.found_effects import FoundEffect
+from stiction_ros.discrepancy.answer.found_effects import FoundEffect, listed_names
 from stiction_ros.discrepancy.candidate.base import Candidate
 from stiction_ros.discrepancy.data.controller_check import ControllerCheck, ControllerStatus
 from stiction_ros.discrepancy.data.gate import SHOWN, Gate
 from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict
 from stiction_ros.discrepancy.decision.explanation import ProcessChange
+from stiction_ros.discrepancy.decision.probability import Name, Standing
 from stiction_ros.discrepancy.decision.scores import Scores, Testable
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import OutputGap, OutputNoise
@@ -110,6 +111,7 @@ class Discrepancy:
         verdict: of all looks together.
         effects: what was found, the largest first.
         alternatives: places and effects that stay possible beside ``effects``.
+        in_doubt: how far a set is ahead that no effect stands for; None where there is none.
         experiment: what would tell them apart, or make the effects testable.
         where: sentences that say where the gap is.
         untestable: effects that these records could not show.
@@ -139,6 +141,7 @@ class Discrepancy:
     verdict: GapVerdict
     effects: tuple[FoundEffect, ...]
     alternatives: tuple[tuple[str, str], ...]
+    in_doubt: Standing | None
     experiment: str
     where: tuple[str, ...]
     untestable: tuple[Testable, ...]
@@ -163,6 +166,14 @@ class Discrepancy:
         return f"<Discrepancy {self.verdict}{f': {named}' if named else ''}>"
 
     @property
+    def probabilities(self) -> Mapping[Name, float]:
+        """How probable each effect is that is named or possible."""
+        told = dict(self.in_doubt.probabilities()) if self.in_doubt else {}
+        for effect in reversed(self.effects):
+            told |= effect.standing.probabilities()
+        return told
+
+    @property
     def not_considered(self) -> tuple[NotConsidered, ...]:
         """Every behaviour that was no candidate and is not named, with the reason.
 
@@ -184,7 +195,7 @@ class Discrepancy:
         return {
             "verdict": self.verdict.value,
             "effects": [effect.to_dict() for effect in self.effects],
-            "alternatives": [{"place": p, "effect": e} for p, e in self.alternatives],
+            "alternatives": listed_names(self.alternatives, self.probabilities),
             "experiment": self.experiment,
             "where": list(self.where),
             "untestable": [

@@ -16,6 +16,14 @@ from stiction_ros.discrepancy.measures import LONGEST_DELAY, MAJORITY, NEGLIGIBL
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray, about
 
+PLACES = {
+    "valve": "valve {tag}",
+    "load": "the load at {tag}",
+    "process": "the process to {tag}",
+    "disturbance": "a disturbance on {tag}",
+    "sensor": "the sensor of {tag}",
+}
+
 
 def overall(
     shown: Sequence[FoundEffect],
@@ -112,14 +120,7 @@ def called(place: str, effect: str, law: str | None = None) -> str:
     """Return an effect for people, such as ``stiction (he) of valve V1``."""
     kind, _, tag = place.partition(":")
     effect = effect.replace("_", " ").replace("pole", "pole (order)") + (f" ({law})" if law else "")
-    words = {
-        "valve": f"{effect} of valve {tag}",
-        "load": f"{effect} of the load at {tag}",
-        "process": f"{effect} of the process to {tag}",
-        "disturbance": f"{effect} of a disturbance on {tag}",
-        "sensor": f"{effect} of the sensor of {tag}",
-    }
-    return words.get(kind, effect)
+    return f"{effect} of {PLACES[kind].format(tag=tag)}" if kind in PLACES else effect
 
 
 def stem_sentences(run: FreeRun, fits: Sequence[CandidateFit]) -> list[str]:

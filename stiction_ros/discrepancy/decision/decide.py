@@ -55,6 +55,8 @@ class Decision:
     # of an unknown gap, the candidate that gains most and that the held-out rows refuse: what is
     # not yet in the model may be why. None where there is none
     lent: CandidateFit | None = None
+    # of all candidates that were allowed
+    fits: tuple[CandidateFit, ...] = dataclasses.field(default=(), compare=False, repr=False)
 
 
 def decide(

@@ -25,6 +25,7 @@ class AddedEffect:
     fit: CandidateFit  # its last fit, with every other added effect in place
     # places and effects that the record does not tell from it
     alternatives: tuple[tuple[str, str], ...] = ()
+    fits: tuple[CandidateFit, ...] = ()  # of all candidates in its place
 
     @property
     def place(self) -> str:

@@ -21,6 +21,8 @@ from stiction_ros.discrepancy.answer.say import (
     stem_sentences,
 )
 from stiction_ros.discrepancy.decision.decide import GapVerdict, on_the_way, verdict_of
+from stiction_ros.discrepancy.decision.explanation import AddedEffect
+from stiction_ros.discrepancy.decision.probability import standing
 from stiction_ros.discrepancy.decision.scores import testable_effects
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.uncertainty import (
@@ -62,9 +64,13 @@ def closing(task: Task, looked: State) -> Discrepancy:
     shown, answers = [of_data(finding) for finding in task.data], [*found, *louder]
     effects = [*shown, *answers]
     gained = state.before.score - base.score + sum(noise.delta_bic for noise in louder)
-    last = state.looks[-1].scores
+    last, chosen = state.looks[-1].scores, state.looks[-1].decision.chosen
     testable = testable_effects(last.base, last.candidates, task.options.margin)
     verdict, alternatives = overall(shown, answers, state.looks, testable, gained)
+    in_doubt = None
+    if alternatives and not answers and chosen is not None:
+        left = AddedEffect(chosen, alternatives, state.looks[-1].decision.fits)
+        in_doubt = standing(left, state.now.effects)
     model = state.now.bare
     for named in answers:
         model = model.with_effect(named.place, named.behaviour, **_provenance(task, named))
@@ -78,13 +84,13 @@ def closing(task: Task, looked: State) -> Discrepancy:
         verdict = GapVerdict.UNKNOWN
     elif silent and state.now.changes:
         verdict = GapVerdict.NAMED
-    told = {(e.place, e.effect) for e in effects} | {n for e in effects for n in e.alternatives}
-    told |= set(alternatives)
+    told = {name for each in effects for name in each.standing.evidences} | {*alternatives}
     task.report(1.0)
     return Discrepancy(
         verdict=verdict,
         effects=tuple(effects),
         alternatives=alternatives,
+        in_doubt=in_doubt,
         experiment=experiment_for(verdict, effects, alternatives, testable),
         where=_where(task, state, noises, no_names, verdict),
         untestable=tuple(t for t in testable if not t.testable and (t.place, t.effect) not in told),
@@ -170,6 +176,7 @@ def _found(task: Task, state: State) -> list[FoundEffect]:
             verdict_of(effect.effect, effect.alternatives),
             effect.alternatives,
             reason_for(effect, state.looks),
+            standing(effect, now.others(k)),
         )
         found.append(told)
     return found

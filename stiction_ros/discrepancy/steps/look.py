@@ -126,7 +126,8 @@ def decided(task: Task, state: State, scores: Scores) -> Decision:
     decision = decide(allowed, task.options.margin, rests)
     if task.options.process_fitted:
         decision = _in_doubt_of_place(base, decision)
-    return told_by_stem(base.run, decision, allowed)
+    decision = told_by_stem(base.run, decision, allowed)
+    return dataclasses.replace(decision, fits=tuple(allowed))
 
 
 def _extended(task: Task, state: State, decision: Decision) -> tuple[Explanation | None, str]:
@@ -138,7 +139,7 @@ def _extended(task: Task, state: State, decision: Decision) -> tuple[Explanation
     if chosen is None or (fitted and not decision.inseparable):
         return None, decision.reason
     effects: Sequence[AddedEffect]
-    effects = (*now.effects, AddedEffect(chosen, decision.alternatives))
+    effects = (*now.effects, AddedEffect(chosen, decision.alternatives, decision.fits))
     process = changed_again(task, state, effects)
     if process is None:
         process = now

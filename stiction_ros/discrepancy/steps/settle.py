@@ -80,7 +80,7 @@ def told_again(task: Task, state: State) -> State:
 def _told(task: Task, state: State, k: int) -> State:
     own, margin = state.now.effects[k], task.options.margin
     tried = [(own, state.now)]
-    twins, rivals = _rivals(task, state, k)
+    fits, twins, rivals = _rivals(task, state, k)
     for rival in rivals:
         other = AddedEffect(rival, rival.candidate.twins)
         added = (*state.now.effects[:k], other, *state.now.effects[k + 1 :])
@@ -93,7 +93,7 @@ def _told(task: Task, state: State, k: int) -> State:
         for key in each.fit.candidate.keys
     ]
     alternatives = tuple(dict.fromkeys([*_inseparable(best, twins), *near]))
-    told = dataclasses.replace(kept.effects[k], alternatives=alternatives)
+    told = dataclasses.replace(kept.effects[k], alternatives=alternatives, fits=tuple(fits))
     effects = (*kept.effects[:k], told, *kept.effects[k + 1 :])
     return dataclasses.replace(state, now=dataclasses.replace(kept, effects=effects))
 
@@ -109,10 +109,12 @@ def _inseparable(effect: AddedEffect, twins: Keys) -> list[tuple[str, str]]:
     ]
 
 
-def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]:
-    """Return what is an effect's twin, and what explains nearly as much in its place.
+def _rivals(
+    task: Task, state: State, k: int
+) -> tuple[list[CandidateFit], Keys, list[CandidateFit]]:
+    """Return all fits in an effect's place, its twins, and what explains nearly as much.
 
-    Both are asked beside the others as they are.
+    All are asked beside the others as they are.
     """
     own = state.now.effects[k].fit.candidate
     others = state.holding(state.now.others(k))
@@ -132,4 +134,4 @@ def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]
         and not others.now.tells(f)
         and not (own.about.family == f.candidate.about.family == FRICTION)
     ]
-    return twins, alike[:TRIED]
+    return fits, twins, alike[:TRIED]

@@ -1,9 +1,8 @@
-"""``stiction calibrate``: the probability of friction, fitted to loops whose truth is known."""
+"""``stiction calibrate``: probabilities of friction and of effects, fitted to known loops."""
 
 import argparse
 import dataclasses
 import functools
-import itertools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,7 @@ from stiction_studies.judged_log import logged_rows, start_log
 from stiction_studies.seeds import add_jobs, run_each, seed_range
 
 if TYPE_CHECKING:
+    from stiction_ros.effects import FloatArray
     from stiction_studies.calibration.fitting import Judged
 
 SEEDS = {
@@ -32,7 +32,13 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "calibrate",
         description="Identify simulated loops, fit the probability to their figures, and hold "
-        "each loop against what is fitted to others.",
+        "each loop against what is fitted to others. With --gap: fit the probability of effects.",
+    )
+    parser.add_argument(
+        "--gap",
+        type=Path,
+        metavar="LOG",
+        help="log of ``stiction bench world``: fit the probability of what ``stiction gap`` names",
     )
     parser.add_argument(
         "--worlds",
@@ -91,6 +97,8 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     from stiction_studies.calibration.fitting import fitted
 
+    if options.gap is not None:
+        return _run_gap(options)
     known: list[Judged] = []
     if options.log is not None:
         known = logged_rows(options.log, True, _row_of) if options.log.exists() else []
@@ -108,10 +116,29 @@ def run(options: argparse.Namespace) -> int:
     rows = [row for row in (*known, *found) if (row.world, row.seed) in set(tasks)]
     show(rows, options.ablate)
     if options.out is not None:
-        told = {"fitted_to": seeds, "loops": len(rows)} | fitted(rows)._asdict()
-        with storing(options.out):
-            options.out.write_text(json.dumps(told, separators=(",", ":")) + "\n", "utf-8")
+        _write(options.out, {"fitted_to": seeds, "loops": len(rows)} | fitted(rows)._asdict())
     return 0
+
+
+def _run_gap(options: argparse.Namespace) -> int:
+    from stiction_studies.blind.scores.world_scores import WorldScore
+    from stiction_studies.calibration.fitting import FOLDS
+    from stiction_studies.calibration.gap_fitting import fitted, held
+
+    scores = logged_rows(options.gap, False, WorldScore.from_mapping)
+    Console().print(reliability(*held(scores, FOLDS), "members", "there"))
+    if options.out is not None:
+        seeds: dict[str, list[int]] = {}
+        for row in scores:
+            seeds.setdefault(f"{row.family}-{row.given}", []).append(row.seed)
+        told = {world: [min(own), max(own)] for world, own in seeds.items()}
+        _write(options.out, {"fitted_to": told, "loops": len(scores)} | fitted(scores)._asdict())
+    return 0
+
+
+def _write(path: Path, told: dict[str, Any]) -> None:
+    with storing(path):
+        path.write_text(json.dumps(told, separators=(",", ":")) + "\n", "utf-8")
 
 
 def show(rows: "list[Judged]", ablate: bool) -> None:
@@ -132,13 +159,8 @@ def show(rows: "list[Judged]", ablate: bool) -> None:
             for key, value in counts(told, [rows[i] for i in own]).items():
                 table.add_row(key, f"{value:.3f}")
             console.print(table)
-    bins = Table("probability", "loops", "with friction")
-    tenths = np.minimum(10.0 * folds, 9.0).astype(int)
-    for k in np.unique(tenths):
-        inside = tenths == k
-        true = np.mean([row.friction for row in itertools.compress(rows, inside)])
-        bins.add_row(f"{folds[inside].mean():.2f}", f"{inside.sum()}", f"{true:.2f}")
-    console.print(bins)
+    truth = np.array([row.friction for row in rows])
+    console.print(reliability(folds, truth, "loops", "with friction"))
     if ablate:
         table = Table("without", "loss, nats a loop", "more")
         whole = loss(folds, rows)
@@ -146,6 +168,16 @@ def show(rows: "list[Judged]", ablate: bool) -> None:
             other = loss(by_folds(rows, name), rows)
             table.add_row(name, f"{other:.4f}", f"{other - whole:+.4f}")
         console.print(table)
+
+
+def reliability(told: "FloatArray", true: "FloatArray", what: str, is_true: str) -> Table:
+    """Return how often what is told with a probability is true, in tenths of it."""
+    table = Table("probability", what, is_true)
+    tenths = np.minimum(10.0 * told, 9.0).astype(int)
+    for k in np.unique(tenths):
+        inside = tenths == k
+        table.add_row(f"{told[inside].mean():.2f}", f"{inside.sum()}", f"{true[inside].mean():.2f}")
+    return table
 
 
 def _row_of(values: Any) -> "Judged":

@@ -12,6 +12,12 @@ from stiction_studies.calibration.loops import WORLDS
 from stiction_studies.calibration.plain_loops import plain_loop
 from stiction_studies.commands import calibrate
 
+ROW = {
+    **{"full": False, "family": "single", "given": "exact", "cause": "none", "plant": "flow"},
+    **{"circumstances": [], "oracle": [], "wrong": [], "right": True, "silent": True, "sets": 0},
+    **{"held": 0, "said": "none", "closed": None, "covered": {}, "seconds": 1.0, "answer": {}},
+}
+
 
 def test_the_command_offers_every_world() -> None:
     assert set(calibrate.SEEDS) == set(WORLDS)
@@ -61,3 +67,25 @@ def test_trees_are_fitted_to_a_log_and_written(tmp_path: Path) -> None:
     ]
     assert main(call) == 0
     assert json.loads(out.read_text("utf-8"))["loops"] == 80
+
+
+def test_the_probability_of_effects_is_fitted_to_a_log_and_written(tmp_path: Path) -> None:
+    random = np.random.default_rng(2)
+    log, out = tmp_path / "log.jsonl", tmp_path / "gap.json"
+    rows = []
+    for seed in range(300):
+        ahead = float(np.exp(random.uniform(0.0, 8.0)))
+        there = random.random() < 1.0 / (1.0 + np.exp(2.0 - np.log1p(ahead)))
+        behind = float(random.uniform(0.0, 10.0))
+        first = random.random() < 1.0 / (1.0 + np.exp(-behind / 8.0))
+        members = [[50.0, bool(there and first)], [50.0 - behind, bool(there and not first)]]
+        claims = [[ahead, members if seed % 2 else [[50.0, bool(there)]]]]
+        rows.append(ROW | {"seed": seed, "claims": claims})
+    log.write_text("\n".join(map(json.dumps, rows)) + "\n", "utf-8")
+    assert main(["calibrate", "--gap", str(log), "--out", str(out)]) == 0
+    told = json.loads(out.read_text("utf-8"))
+    assert told["loops"] == 300
+    assert told["fitted_to"] == {"single-exact": [0, 299]}
+    assert told["constant"] == pytest.approx(-2.0, abs=0.8)
+    assert told["slope"] == pytest.approx(1.0, abs=0.25)
+    assert told["temperature"] == pytest.approx(4.0, rel=0.6)

@@ -89,7 +89,7 @@ def judge(full: bool, log: Path, case: Case) -> "WorldScore":
     """Run the workflow on one loop and compare; it sees model and record alone."""
     from stiction_ros.discrepancy import GapOptions, find_discrepancy
     from stiction_ros.loop import LoopModel
-    from stiction_studies.blind.scores.world_scores import score
+    from stiction_studies.blind.scores.world_scores import claimed, score
     from stiction_studies.field.hidden import hidden_loop
     from stiction_studies.field.hidden.oracle import oracle
 
@@ -100,6 +100,7 @@ def judge(full: bool, log: Path, case: Case) -> "WorldScore":
     found = find_discrepancy(model, [loop.record], GapOptions(quick=not full))
     seconds = time.process_time() - begun
     row = score(loop, given, found.to_dict(), oracle(loop), seconds)
+    row = dataclasses.replace(row, claims=claimed(loop, found))
     keep_row(log, full, row.to_mapping())
     return row
 

@@ -2,10 +2,11 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from stiction_studies.blind.scores.scoring import Claim, claims_of
+from stiction_ros.discrepancy import Discrepancy
+from stiction_studies.blind.scores.scoring import Claim, Row, claims_of
 from stiction_studies.field.hidden import Effect, HiddenLoop, Name
 from stiction_studies.field.hidden.effect import PROCESS, SENSOR, VALVE
 from stiction_studies.field.hidden.oracle import Gain, family
@@ -17,7 +18,7 @@ KEPT = ("verdict", "effects", "alternatives", "process_changes", "noise", "untes
 
 
 @dataclasses.dataclass(frozen=True)
-class WorldScore:
+class WorldScore(Row):
     """One loop, judged."""
 
     family: str
@@ -38,6 +39,9 @@ class WorldScore:
     covered: Mapping[str, bool]  # per figure that was found, whether its interval holds the truth
     seconds: float  # processor time of the workflow
     answer: Mapping[str, Any]  # what the workflow said, abridged
+    # per effect or set: the evidence that it is ahead; of each member its evidence, and whether it
+    # is there
+    claims: Sequence[tuple[float, Sequence[tuple[float, bool]]]] = ()
 
     @property
     def healthy(self) -> bool:
@@ -58,12 +62,6 @@ class WorldScore:
         """Return what it gains by the largest of them over no effect."""
         gains = [entry["none"] for entry in self.oracle]
         return max(gains, default=math.nan)
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the JSON mapping; a missing ``closed`` is null."""
-        values = dataclasses.asdict(self)
-        values["closed"] = None if math.isnan(self.closed) else self.closed
-        return values
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> "WorldScore":
@@ -90,18 +88,13 @@ def score(
         seconds: processor time of the workflow.
     """
     claims = claims_of(answer)
-    may = loop.also | _changes(loop, answer)
-    if any(effect.mechanical for effect in loop.hidden):
-        may |= {(VALVE, "lag")}  # of the stem's actuator
     families = [family(loop, effect) for effect in loop.hidden]
     names = [_names(effect) for effect in loop.hidden]
-    there = may.union(*names)
+    may, there, in_doubt = there_of(loop, answer)
     wrong = tuple(_word(c.first) for c in claims if c.named and c.first not in there)
     if loop.known == loop.base.plant:
         wrong += tuple(f"process {change['what']}" for change in answer.get("process_changes", ()))
     sets = [c for c in claims if not c.named]
-    gain_is_off = abs(loop.known.gain) != abs(loop.base.plant.gain)
-    in_doubt = there | ({(PROCESS, "gain")} if gain_is_off else set())  # a set says no direction
     held = sum(bool(c.names & in_doubt) for c in sets)
     found = [
         any(_is_right(c, own, alike | may) for c in claims) or _changed(loop, effect, answer)
@@ -128,6 +121,30 @@ def score(
         seconds=seconds,
         answer={key: answer[key] for key in KEPT if key in answer},
     )
+
+
+def claimed(loop: HiddenLoop, found: Discrepancy) -> list[tuple[float, list[tuple[float, bool]]]]:
+    """Return what is claimed, each member with the truth, as :attr:`WorldScore.claims` has it."""
+    _, there, in_doubt = there_of(loop, found.to_dict())
+    told = []
+    for each in (*(effect.standing for effect in found.effects), found.in_doubt):
+        if each is not None:
+            true = in_doubt if len(each.evidences) > 1 else there
+            told.append((each.ahead, [(e, name in true) for name, e in each.evidences.items()]))
+    return told
+
+
+def there_of(
+    loop: HiddenLoop, answer: Mapping[str, Any]
+) -> tuple[frozenset[Name], frozenset[Name], frozenset[Name]]:
+    """Return what may be named besides what is hidden, all, and all that a set may hold."""
+    may = loop.also | _changes(loop, answer)
+    if any(effect.mechanical for effect in loop.hidden):
+        may |= {(VALVE, "lag")}  # of the stem's actuator
+    gain_is_off = abs(loop.known.gain) != abs(loop.base.plant.gain)
+    there = may.union(*map(_names, loop.hidden))
+    gain = {(PROCESS, "gain")} if gain_is_off else set()  # a set says no direction
+    return may, there, there | gain
 
 
 def _names(effect: Effect) -> frozenset[Name]:
