@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
@@ -30,6 +31,8 @@ from stiction_ros.discrepancy.measures import TURNS
 from stiction_ros.discrepancy.process.change import open_figures, refitted_process
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import changed_again, process_first
+
+SCORES = ("scores",)  # of a model as it is, by name
 
 
 def look_on(task: Task, state: State) -> State:
@@ -111,7 +114,10 @@ def scored_by(task: Task, state: State, k: int) -> Scores:
         task.report((k + done) * share)
 
     beside = left_open(now.base.run, now.effects, now.slopes) if now.slopes else None
-    return score_candidates(base, candidates, report, beside=beside)
+    known = base.known if beside is None else {}
+    if SCORES not in known:
+        known[SCORES] = score_candidates(base, candidates, report, beside=beside)
+    return cast("Scores", known[SCORES])
 
 
 def decided(task: Task, state: State, scores: Scores) -> Decision:
