@@ -13,19 +13,10 @@ import numpy as np
 
 from stiction_ros.checks import one_of
 from stiction_ros.deferred import halton_sequence
-from stiction_ros.effects import (
-    Behaviour,
-    FloatArray,
-    FrictionLaw,
-    HeStiction,
-    Parameter,
-    Stiction,
-    behaviours,
-)
+from stiction_ros.effects import Behaviour, FloatArray, FrictionLaw, Parameter, Stiction, behaviours
 from stiction_ros.errors import InputError
 
 BEGINNINGS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)  # of a stem, shares of f_S away from OP
-TURN = 0.1  # of the span of OP: less is no turn
 Judge = Callable[[FloatArray], FloatArray]
 """The loss of rows (f_S, f_D, further parameters …, start), shape (G, 3 + n), as shape (G,)."""
 POINTS = 9  # per further parameter in the first grid
@@ -166,14 +157,6 @@ def simulate(
     elif len(further):
         rows = np.column_stack([rows, np.tile(further, (len(rows), 1))])
     return law.simulate_grid(rows, u, start)
-
-
-def samples_of_turns(op: FloatArray, band: float, turns: int) -> int | None:
-    """Return how many samples of OP hold so many reversals by ``band``; None: there are fewer."""
-    moves = np.diff(HeStiction.simulate_grid(np.array([[band, band]]), op, float(op[0]))[:, 0])
-    at = np.flatnonzero(moves)
-    reversed_at = at[1:][np.sign(moves[at[1:]]) != np.sign(moves[at[:-1]])]
-    return int(reversed_at[turns - 1]) + 1 if len(reversed_at) >= turns else None
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,7 +10,7 @@ from stiction_ros.identification.evidence.fit_kernels import Given, losses_of
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.output_fit import OutputFit, fit_output
 from stiction_ros.identification.evidence.whitened import Whitened
-from stiction_ros.identification.kernels.scan import best_apart
+from stiction_ros.identification.kernels.scan import rows_apart
 from stiction_ros.identification.linear.response_prior import FREE
 
 TOGETHER = 256
@@ -95,12 +95,6 @@ class Judge:
             )
             out[some] = found.sum(axis=1).min(axis=0)
         return out
-
-
-def rows_apart(places: FloatArray, found: FloatArray, count: int, distance: float) -> list[int]:
-    """Return the best of ``places``; what lies just at the distance, as in a grid, is too near."""
-    beyond = float(np.nextafter(distance, np.inf))
-    return [int(i) for i in best_apart(places, found, count, beyond)]
 
 
 def ideal(problem: Problem) -> Candidate:

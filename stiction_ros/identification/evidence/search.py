@@ -16,10 +16,8 @@ from stiction_ros.identification.evidence.candidate import (
     candidates_apart,
     fitted_from,
     ideal,
-    rows_apart,
 )
 from stiction_ros.identification.evidence.fit_problem import LIMIT, Problem
-from stiction_ros.identification.evidence.growing import grown
 from stiction_ros.identification.evidence.output_fit import (
     OutputFit,
     beginnings,
@@ -27,12 +25,15 @@ from stiction_ros.identification.evidence.output_fit import (
     follow,
     white,
 )
+from stiction_ros.identification.friction import Judge as Losses
 from stiction_ros.identification.friction import (
     coarse_grid,
     cross_grid,
     finer_grid,
     with_beginnings,
 )
+from stiction_ros.identification.growing import first_beginning, grown
+from stiction_ros.identification.kernels.scan import rows_apart
 
 SEEDS = 6  # frictions taken from one look at the whole triangle
 APART = 0.03  # of the span of OP, by which they differ
@@ -130,7 +131,14 @@ class _Valve:
 
     def grow(self, fits: Sequence[OutputFit]) -> None:
         """Take the best of what is found on growing beginnings of the record."""
-        rows, found = grown(self.problem, self.base, self.valve, fits)
+        whole, base, valve = self.problem, self.base, self.valve
+
+        def judged(count: int) -> Losses:
+            return Judge.of(whole.beginning(count), base.beginning(count), valve, fits).losses
+
+        rows, found = grown(
+            judged, whole.rows, first_beginning(whole.op[valve], LIMIT, whole.rate), LIMIT
+        )
         for i in rows_apart(rows[:, :2], found, SEEDS, APART):
             self.add(rows[i], fits, whole=False)
 

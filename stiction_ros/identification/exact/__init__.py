@@ -1,1 +1,1 @@
-"""The exact search: grids, switching patterns near them, narrow patterns grown piece by piece."""
+"""The exact search: grids, also over growing beginnings, and switching patterns near them."""

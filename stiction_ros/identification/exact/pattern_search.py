@@ -1,12 +1,11 @@
 """Evaluates switching patterns of one valve, each at its best f_D.
 
 Patterns are listed exactly (:mod:`stiction_ros.identification.switching`) in rectangles of
-the (J, S) plane. Which rectangle is worth it is for :mod:`.neighbourhood` and
-:mod:`.growing_patterns` to say; the remaining frictions are searched on grids (:mod:`.search`).
+the (J, S) plane. Which rectangle is worth it is for :mod:`.neighbourhood` to say; the remaining
+frictions are searched on grids (:mod:`.search`).
 """
 
 import dataclasses
-from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -188,37 +187,16 @@ class PatternSearch:
             return None
         met = [cells_at(self.u, begin, np.empty((0, 2)), self.law)]
         count, whole = 0, area(todo)
-        for cells, left in self._layers(begin, todo):
+        while len(todo):  # one cell of every rectangle, and what they leave
+            cells = cells_at(self.u, begin, points_inside(todo), self.law)
             met.append(cells)
+            todo = self._admissible(remainders(todo, cells.bounds))
             count += len(cells.bounds)
-            covered = whole - area(left)
-            too_many = count + len(left) > most
-            if len(left) and (too_many or (count > FEW and count * whole > 2.0 * most * covered)):
+            covered = whole - area(todo)
+            too_many = count + len(todo) > most
+            if len(todo) and (too_many or (count > FEW and count * whole > 2.0 * most * covered)):
                 return None
         return Cells.joined(met).distinct()
-
-    def some_cells(self, begin: Beginning, rectangles: FloatArray, most: int) -> PatternScan:
-        """Return cells that meet the rectangles, shape (R, 4), each once; all if they are few.
-
-        Args:
-            most: number of cells met, some of them repeatedly, from which on no more are listed.
-        """
-        inside = np.clip(rectangles, 0.0, 2.0 * self.limit)
-        met = [cells_at(self.u, begin, np.empty((0, 2)), self.law)]
-        for cells, _ in self._layers(begin, self._admissible(inside)):
-            met.append(cells)
-            if sum(len(part.bounds) for part in met) >= most:
-                break
-        return self.evaluate(Cells.joined(met).distinct())
-
-    def _layers(
-        self, begin: Beginning, rectangles: FloatArray
-    ) -> Iterator[tuple[Cells, FloatArray]]:
-        """Yield one cell of every rectangle and what they leave, until nothing is left."""
-        while len(rectangles):
-            cells = cells_at(self.u, begin, points_inside(rectangles), self.law)
-            rectangles = self._admissible(remainders(rectangles, cells.bounds))
-            yield cells, rectangles
 
     def _admissible(self, rectangles: FloatArray) -> FloatArray:
         """Return the rectangles that hold frictions 0 ≤ f_D ≤ f_S ≤ limit."""

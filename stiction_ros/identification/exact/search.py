@@ -2,9 +2,10 @@
 
 A valve's friction is found by scanning the triangle with everything else fixed
 (:mod:`stiction_ros.identification.problem.scan`), closer and closer round the best points, and in
-short records on growing windows (:mod:`.growing_patterns`); candidates are judged by the exact fit
-under the noise model (:mod:`stiction_ros.identification.problem.output_error`); the best ends in
-the best switching pattern of its neighbourhood (:mod:`.pattern_search`).
+short records on growing beginnings (:mod:`stiction_ros.identification.growing`); candidates are
+judged by the exact fit under the noise model
+(:mod:`stiction_ros.identification.problem.output_error`); the best ends in the best switching
+pattern of its neighbourhood (:mod:`.pattern_search`).
 """
 
 import dataclasses
@@ -14,7 +15,6 @@ import numpy as np
 
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.exact.growing_patterns import LONGEST, growing_patterns
 from stiction_ros.identification.exact.neighbourhood import REJECTED, SAMPLES, refine
 from stiction_ros.identification.exact.pattern_search import PatternSearch, best_in_cells, points_of
 from stiction_ros.identification.friction import (
@@ -24,7 +24,17 @@ from stiction_ros.identification.friction import (
     even_grid,
     finer_grid,
 )
-from stiction_ros.identification.problem.models import Criterion, Data, Model, ValveScan, with_valve
+from stiction_ros.identification.friction import Judge as Losses
+from stiction_ros.identification.growing import first_beginning, grown
+from stiction_ros.identification.kernels.scan import rows_apart
+from stiction_ros.identification.problem.models import (
+    FEWEST_MOVES,
+    Criterion,
+    Data,
+    Model,
+    ValveScan,
+    with_valve,
+)
 
 STEPS = 80
 WORK = 24_000_000
@@ -35,6 +45,8 @@ FIRST_PARENTS = 20
 RIVALS = 2
 PARENTS = 6
 FITTED = 3
+GROWN = 4  # frictions of growing beginnings that are fitted
+FINENESS = 3  # of growing beginnings, as a scan costs little
 SWEEPS = 5
 EXACT_SEARCH_ROUNDS = 3
 CROSS = 200
@@ -43,6 +55,7 @@ ALIKE = 0.9
 EQUAL = 10.0
 AWAY_STEPS = 30  # of the grids of stems that begin away from OP
 FURTHER = 2  # beginnings that are searched further
+LONGEST = 1500  # samples of a record that is also taken in piece by piece
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,6 +129,34 @@ def first_search(data: Data, first: FirstScan, growing: bool) -> Model:
     promising = sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]
     closer = [comb(data, rival, valve) for rival in promising if rival.friction[valve, 0] > 0.0]
     return min([model, *closer], key=lambda candidate: candidate.loss)
+
+
+def growing_patterns(data: Data, model: Model, valve: int) -> Model:
+    """Return the best model found on growing beginnings of the record, or ``model``.
+
+    Args:
+        model: gives the stems of the other valves.
+    """
+    limit, u, orders = float(data.limit[valve]), data.u[valve], model.orders
+
+    def search(count: int) -> PatternSearch:
+        part, shown = data.part(0, count), model.beginning(count)
+        return PatternSearch(part, shown, valve, criterion=Criterion.ONE_STEP)
+
+    def judged(count: int) -> Losses:
+        one = search(count)
+        return lambda rows: one.scan(rows[:, :2], rows[:, 2]).loss
+
+    free = 2 * orders.output + len(data.u) * orders.input + orders.noise + 3
+    first = first_beginning(u, limit, least=orders.first + 5 * free)
+    rows, found = grown(judged, len(u), first, limit, FINENESS)
+    chosen = rows[rows_apart(rows[:, :2], found, GROWN, APART * limit)]
+    best, scan = model, search(len(u)).scan(chosen[:, :2], chosen[:, 2])
+    for i in np.flatnonzero(scan.moves >= FEWEST_MOVES):
+        start = float(scan.starts[i])
+        rival = with_valve(data, model, valve, scan.grid[i], start, scan.delays[i], warm=False)
+        best = min(best, rival, key=lambda candidate: candidate.loss)
+    return best
 
 
 def _from_fitted(data: Data, first: FirstScan) -> Model:
@@ -237,8 +278,7 @@ def search(
     """Coordinate search over all valves: the most promising first, until nothing changes.
 
     Args:
-        growing: take a short record in piece by piece as well, under He's law
-            (:mod:`.growing_patterns`).
+        growing: take a short record in piece by piece as well, under He's law.
 
     Returns:
         The best model, and pairs (valve with friction, valve whose friction does as well).

@@ -298,3 +298,9 @@ def best_apart(grid: FloatArray, loss: FloatArray, count: int, apart: float) -> 
                 left[g] = np.inf
         left[best] = np.inf
     return chosen[:number].copy()
+
+
+def rows_apart(places: FloatArray, found: FloatArray, count: int, distance: float) -> list[int]:
+    """Return the best of ``places``; what lies just at the distance, as in a grid, is too near."""
+    beyond = float(np.nextafter(distance, np.inf))
+    return [int(i) for i in best_apart(places, found, count, beyond)]

@@ -9,8 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from samples import stems
 
+from stiction_ros.effects import FloatArray
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.identification.exact.growing_patterns import first_slips
 from stiction_ros.identification.exact.neighbourhood import neighbourhood, refine
 from stiction_ros.identification.exact.pattern_search import PatternSearch, nearby_delays, points_of
 from stiction_ros.identification.problem.models import (
@@ -21,7 +21,13 @@ from stiction_ros.identification.problem.models import (
     with_valve,
 )
 from stiction_ros.identification.problem.preparation import prepare, window
-from stiction_ros.identification.switching import StepSignals, beginning_of, cells_at, levels_with
+from stiction_ros.identification.switching import (
+    Beginning,
+    StepSignals,
+    beginning_of,
+    cells_at,
+    levels_with,
+)
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +48,13 @@ def search_of(near_truth: tuple[Data, Model]) -> PatternSearch:
     return PatternSearch(data, model, 0, 0, begin)
 
 
+def extreme_slips(u: FloatArray) -> list[Beginning]:
+    """Return three first slips at the largest steps of OP beyond all that it was."""
+    beyond = np.diff(np.maximum.accumulate(u)) - np.diff(np.minimum.accumulate(u))
+    rows = np.sort(np.argsort(-beyond, kind="stable")[:3]) + 1
+    return [Beginning(float(u[0]), int(k), float(np.sign(u[k] - u[0]))) for k in rows]
+
+
 def test_enumerated_cells_fill_the_rectangle(near_truth: tuple[Data, Model]) -> None:
     search = search_of(near_truth)
     assert search.begin is not None
@@ -60,7 +73,7 @@ def test_a_friction_and_a_start_have_the_pattern_of_their_cell(
     near_truth: tuple[Data, Model], jump: float, more: float, slip: int
 ) -> None:
     data, model = near_truth
-    begin = first_slips(data.u[0, :300])[slip]
+    begin = extreme_slips(data.u[0, :300])[slip]
     search = PatternSearch(data, model, 0, 0, begin, Criterion.ONE_STEP)
     scan = search.evaluate(cells_at(search.u, begin, np.array([[jump, jump + more]])))
     friction, start = search.realised(scan, 0, begin)
@@ -87,7 +100,7 @@ def test_levels_of_a_first_slip_are_those_from_which_it_comes(
 def test_no_friction_beyond_the_limit_is_taken(near_truth: tuple[Data, Model]) -> None:
     data, model = near_truth
     narrow = dataclasses.replace(data, limit=np.array([4.5]))
-    begin = first_slips(data.u[0, :300])[0]
+    begin = extreme_slips(data.u[0, :300])[0]
     search = PatternSearch(narrow, model, 0, 0, begin, Criterion.ONE_STEP)
     points = np.array([[0.01, 8.9], [0.5, 8.4], [2.0, 6.9], [4.4, 4.5]])
     scan = search.evaluate(cells_at(search.u, begin, points))
