@@ -26,7 +26,7 @@ from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.effects.friction.moving_rules import MovingRules
 from stiction_ros.errors import InputError
 from stiction_ros.identification.friction import first_values, simulate
-from stiction_ros.identification.kernels.step import dense_steps, he_pattern_steps, he_steps
+from stiction_ros.identification.kernels.step import he_pattern_steps, he_steps
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +49,11 @@ class StepSignals:
         """Return the signals of which ``channels``, shape (N, G) each, hold all samples."""
         count = len(channels[0])
         rows = np.ascontiguousarray(np.stack(channels).transpose(2, 0, 1), dtype=float)
-        return cls(count, *dense_steps(rows))
+        changed = np.ones((len(rows), count), dtype=bool)
+        changed[:, 1:] = (rows[:, :, 1:] != rows[:, :, :-1]).any(axis=1)
+        signals, places = np.nonzero(changed)
+        offsets = np.append(0, np.cumsum(np.count_nonzero(changed, axis=1)))
+        return cls(count, offsets, places, rows[signals, :, places])
 
     @classmethod
     def joined(cls, parts: "list[StepSignals]") -> "StepSignals":

@@ -9,8 +9,6 @@ import numpy as np
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 
-Rows = tuple[IntArray, IntArray, FloatArray]
-
 BLOCK = 8
 MANY = 8  # blocks that are passed over at once where OP stays in the band
 SPARE = 24  # rows per signal for which there is room at first
@@ -46,30 +44,9 @@ def _with_room(
 
 
 @compiled
-def dense_steps(rows: FloatArray) -> Rows:
-    """Return offsets, places and values of signals given sample by sample, shape (G, c, N)."""
-    size, channels, count = rows.shape
-    offsets = np.zeros(size + 1, dtype=np.int64)
-    places = np.empty(SPARE * size + count, dtype=np.int64)
-    values = np.empty((len(places), channels))
-    total = 0
-    for g in range(size):
-        places, values = _with_room(places, values, total, count)
-        for k in range(count):
-            changed = k == 0
-            for c in range(channels):
-                changed = changed or rows[g, c, k] != rows[g, c, k - 1]
-            if changed:
-                places[total] = k
-                for c in range(channels):
-                    values[total, c] = rows[g, c, k]
-                total += 1
-        offsets[g + 1] = total
-    return offsets, places[:total], values[:total]
-
-
-@compiled
-def he_steps(static: FloatArray, dynamic: FloatArray, u: FloatArray, start: FloatArray) -> Rows:
+def he_steps(
+    static: FloatArray, dynamic: FloatArray, u: FloatArray, start: FloatArray
+) -> tuple[IntArray, IntArray, FloatArray]:
     """Return offsets, places and values of stems by (4) of valves that rest at ``start``.
 
     Args:
