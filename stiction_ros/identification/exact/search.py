@@ -17,14 +17,8 @@ from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.exact.neighbourhood import REJECTED, SAMPLES, refine
 from stiction_ros.identification.exact.pattern_search import PatternSearch, best_in_cells, points_of
-from stiction_ros.identification.friction import (
-    BEGINNINGS,
-    coarse_grid,
-    cross_grid,
-    even_grid,
-    finer_grid,
-)
 from stiction_ros.identification.friction import Judge as Losses
+from stiction_ros.identification.friction import coarse_grid, cross_grid, even_grid, finer_grid
 from stiction_ros.identification.growing import first_beginning, grown
 from stiction_ros.identification.kernels.scan import rows_apart
 from stiction_ros.identification.problem.models import (
@@ -37,7 +31,6 @@ from stiction_ros.identification.problem.models import (
 )
 
 STEPS = 80
-WORK = 24_000_000
 APART = 0.03
 FINEST = 0.004
 COMB = 0.0012
@@ -53,38 +46,21 @@ CROSS = 200
 LEAST_GAIN = 0.5
 ALIKE = 0.9
 EQUAL = 10.0
-AWAY_STEPS = 30  # of the grids of stems that begin away from OP
-FURTHER = 2  # beginnings that are searched further
 LONGEST = 1500  # samples of a record that is also taken in piece by piece
 
 
 @dataclasses.dataclass(frozen=True)
 class FirstScan:
-    """The whole triangle of one valve under three criteria.
-
-    Until a valve first slips its stem is where it was left. When that takes long, the right
-    friction is found only from the right beginning, so other beginnings are scanned as well.
-    """
+    """The whole triangle of one valve under three criteria."""
 
     model: Model  # the model whose other valves and noise the scans saw
     valve: int  # index
     scans: Mapping[Criterion, ValveScan]  # by criterion
-    elsewhere: tuple[ValveScan, ...]  # one-step scans of stems that begin away from OP
 
     @property
     def gain(self) -> float:
         """By how much the best friction beats none, in the criterion where it does most."""
-        one_step = float(self.scans[Criterion.ONE_STEP].loss[0])
-        gains = [float(scan.loss[0] - scan.loss[1:].min()) for scan in self.scans.values()]
-        gains += [one_step - float(other.loss.min()) for other in self.elsewhere]
-        return max(gains)
-
-    @property
-    def better_beginnings(self) -> list[ValveScan]:
-        """The best scans from elsewhere that beat all that begin at OP."""
-        least = float(self.scans[Criterion.ONE_STEP].loss.min()) - EQUAL
-        better = [other for other in self.elsewhere if other.loss.min() < least]
-        return sorted(better, key=lambda other: float(other.loss.min()))[:FURTHER]
+        return max(float(scan.loss[0] - scan.loss[1:].min()) for scan in self.scans.values())
 
 
 def first_scan(data: Data, model: Model, valve: int) -> FirstScan:
@@ -92,14 +68,11 @@ def first_scan(data: Data, model: Model, valve: int) -> FirstScan:
     limit, start = float(data.limit[valve]), float(model.start[valve])
     coarse = np.vstack([np.zeros((1, 2)), coarse_grid(limit)])
     fine = np.vstack([coarse, even_grid(limit, STEPS)])
-    points = WORK / (data.y.shape[1] * len(BEGINNINGS))
-    away = even_grid(limit, min(AWAY_STEPS, int(np.sqrt(points))))
-    by = {one: PatternSearch(data, model, valve, criterion=one) for one in Criterion}
-    one_step = by.pop(Criterion.ONE_STEP)
-    elsewhere = tuple(one_step.scan(away, start + share * away[:, 0]) for share in BEGINNINGS)
-    scans = {Criterion.ONE_STEP: one_step.scan(fine, start)}
-    scans |= {criterion: one.scan(coarse, start) for criterion, one in by.items()}
-    return FirstScan(model, valve, scans, elsewhere)
+    scans = {}
+    for criterion in Criterion:
+        grid = fine if criterion is Criterion.ONE_STEP else coarse
+        scans[criterion] = PatternSearch(data, model, valve, criterion=criterion).scan(grid, start)
+    return FirstScan(model, valve, scans)
 
 
 def first_search(data: Data, first: FirstScan, growing: bool) -> Model:
@@ -115,17 +88,13 @@ def first_search(data: Data, first: FirstScan, growing: bool) -> Model:
         chosen = scan.best(count, 0.5 * APART * limit)
         if not chosen:
             return model
-        start = model.start.copy()
-        start[valve] = scan.starts[chosen[0]]
-        moved, parents = dataclasses.replace(model, start=start), scan.grid[chosen]
-        return descend(data, moved, valve, parents, criterion, None, False)
+        return descend(data, model, valve, scan.grid[chosen], criterion, None, False)
 
     rivals = []
     if growing and data.law is HeStiction and data.y.shape[1] <= LONGEST:
         rivals.append(growing_patterns(data, model, valve))
     rivals += [from_scan(scan, criterion) for criterion, scan in first.scans.items()]
     rivals.append(_from_fitted(data, first))
-    rivals += [from_scan(other, Criterion.ONE_STEP) for other in first.better_beginnings]
     promising = sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]
     closer = [comb(data, rival, valve) for rival in promising if rival.friction[valve, 0] > 0.0]
     return min([model, *closer], key=lambda candidate: candidate.loss)
