@@ -127,11 +127,13 @@ class _Judge:
         return _Score(len(inside) * (log + 1.0), held, math.sqrt(variance / missed / unit))
 
     def fitted(self, law: Law) -> NoiseEffect | None:
-        """Return a law with its figures; None where one of them holds nothing out."""
+        """Return a law with its figures; None where one holds nothing, or none is steady."""
         points, scores = self.lattice(law)
         fitted = np.array([score.fitted for score in scores])
         best, (low, high) = int(np.argmin(fitted)), law.range
         found = points[best]
+        if not math.isfinite(fitted[best]):
+            return None
         if np.any(found < low + CLEAR) or np.any(found[1:] > high[1:] - CLEAR):
             return None  # on the bound of its range: then it is no name
         rows = max(int(self.blocks.train.sum()), 2)
@@ -159,6 +161,8 @@ class _Judge:
             points = np.stack([each.ravel() for each in meshed], axis=1)
             scores = [self.score(law.block(point)) for point in points]
             fitted = np.array([score.fitted for score in scores])
+            if not np.isfinite(fitted).any():
+                break  # no figures predict it steadily
             bound = SMOOTH if turn <= 1 else SURE
             kept = points[fitted - fitted.min() <= bound]
             low = np.maximum(kept.min(axis=0) - step, law.range[0])

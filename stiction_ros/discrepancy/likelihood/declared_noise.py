@@ -243,4 +243,6 @@ def steady_gain(
     except ValueError:  # LinAlgError is one
         return None
     missed = float(c @ p @ c) + r
-    return np.asarray(a @ p @ c / missed), missed
+    gain = np.asarray(a @ p @ c / missed)
+    forgets = np.abs(np.linalg.eigvals(a - np.outer(gain, c))).max() < 1.0
+    return (gain, missed) if forgets else None

@@ -204,6 +204,7 @@ class _Search:
             variance = float(left @ left) / max(told, 1.0)
             spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(white.T @ white)) * variance, 0.0))
             seen = np.linalg.norm(white, axis=0) > ROUNDING * np.linalg.norm(target)
+            seen &= spread > 0.0
             count = int(free.sum())
             self.errors[free] = np.where(seen, spread, np.inf)[:count]
             moved = np.zeros(len(free))

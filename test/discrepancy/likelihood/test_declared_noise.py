@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from gap_loops import loop, record
+from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
@@ -17,6 +18,7 @@ from stiction_ros.discrepancy.likelihood.declared_noise import (
     declared_noise,
     rounded,
     seen_noise,
+    steady_gain,
 )
 from stiction_ros.discrepancy.likelihood.noise import Blocks, given_noise, noise_forms
 from stiction_ros.effects import (
@@ -239,3 +241,13 @@ def test_a_rounded_op_is_no_disturbance() -> None:
     assert answer.verdict is GapVerdict.NONE
     assert not answer.effects
     assert not answer.noise[0].disagrees
+
+
+def test_no_predictions_are_steady_that_never_forget() -> None:
+    """A load that walks into a level wanders as noise of its equation does, for ever."""
+    level = np.array([[1.7018108, 1.0], [-0.7018108, 0.0]])
+    a, c = block_diag(level, level, 1.0), np.array([1.0, 0.0, 1.0, 0.0, 0.0])
+    a[2:4, 4] = 0.00257384, 0.00228754
+    for size in np.logspace(-5, -3, 100):
+        found = steady_gain(a, np.diag([1.0, 0.0, 0.0, 0.0, size]), c, 0.001)
+        assert found is None or np.abs(np.linalg.eigvals(a - np.outer(found[0], c))).max() < 1.0
