@@ -28,7 +28,7 @@ def moves_on(model: LoopModel, output: int, valve: int) -> bool:
 
 
 def left_open(run: "FreeRun", output: int) -> list[FloatArray]:
-    """Return columns, shape (N, 1), for what an output does between samples.
+    """Return columns, shape (N, …), for what an output does between samples.
 
     How late within a sample a stem moves is not known, nor how far a lag goes on.
     """
@@ -112,10 +112,16 @@ def not_yet_moved(run: "FreeRun", stems: FloatArray, rates: FloatArray | None = 
 
 
 def _a_sample_late(run: "FreeRun", output: int, valve: int) -> FloatArray:
-    """Return what an output lacks where a stem's moves come a sample late, shape (N, 1)."""
+    """Return what an output lacks where a stem's moves come one sample late, or two, shape (N, 2).
+
+    A stem of mass slides on over the next sample.
+    """
     slews = [each.rate for each in run.model.valves[valve].effects if isinstance(each, Slew)]
     moves = not_yet_moved(run, run.stems[:, [valve]], np.array(slews[-1:]) if slews else None)
-    return run.slope(output, valve, moves)
+    later = np.zeros_like(moves)
+    for rows in run.runs.slices:
+        later[rows][1:] = moves[rows][:-1]
+    return run.slope(output, valve, np.hstack([moves, moves + later]))
 
 
 def _in_process(model: LoopModel, output: int) -> tuple[Behaviour, ...]:
