@@ -91,7 +91,8 @@ def mended(task: Task, state: State) -> State | None:
     if found is None or found.worth(margin) >= state.now.worth(margin) - due:
         return None
     names = [each.effect for each in added] or _left_in_doubt(state)
-    if same_thing(found.changes, names):
+    beside = bool(found.effects) and not added  # which no look has judged yet
+    if not beside and same_thing(found.changes, names):
         return None
     # Where no effect was in the model, the looks have to find it.
     other = found if added else found.holding(())
