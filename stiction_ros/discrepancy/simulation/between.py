@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from stiction_ros.deferred import lfilter
-from stiction_ros.discrepancy.simulation.equation import Changeable, with_equation
-from stiction_ros.discrepancy.simulation.responses import end_to_end, responses_of
+from stiction_ros.discrepancy.simulation.equation import DELAY, Changeable, with_equation
+from stiction_ros.discrepancy.simulation.responses import Responses, end_to_end, responses_of
 from stiction_ros.effects import Behaviour, FloatArray, Lag, Slew
 from stiction_ros.loop import LoopModel
-from stiction_ros.processes import AlteredProcess, ArxProcess
+from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess
 
 if TYPE_CHECKING:
     from stiction_ros.discrepancy.simulation.free_run import FreeRun
@@ -39,7 +39,7 @@ def left_open(run: "FreeRun", output: int) -> list[FloatArray]:
             continue
         on_stem = model.valves[valve].effects
         if any(effect.effect in SLIDING for effect in on_stem):
-            found.append(_a_sample_late(run, output, valve))
+            found += [_a_sample_late(run, output, valve), _half_a_sample_late(run, output, valve)]
         found += [_ahead(run, lag, _of(run, output, lag, valve)) for lag in _lags(on_stem)]
     if asked:
         in_process, at_sensor = _lags(_in_process(model, output)), _lags(model.sensors[output])
@@ -63,18 +63,15 @@ def beyond_samples(
         valve: index of the slow valve; None for the process and the sensor, which slow all.
     """
     step, name = run.runs.sample_time, None if valve is None else run.model.valve_names[valve]
-    plants, process = [], run.model.process
-    inner = process.inner if isinstance(process, AlteredProcess) else process
-    if isinstance(inner, ArxProcess):
-        equation = Changeable(inner.equations[output])
+    plants, equation = [], _equation(run, output)
+    if equation is not None:
         slower = [equation.lagged(lag / step, name) for lag in lags.tolist()]
-        processes = [with_equation(process, output, own, step) for own in slower if own is not None]
-        plants = [responses_of(each, step) for each in processes]
+        plants = [_behind(run, output, own) for own in slower if own is not None]
     parts = []
     for rows in run.runs.slices:
         inputs, values = run.inputs(rows), run.forced[rows, output]
         if valve is not None:
-            inputs = [stem if j == valve else np.zeros_like(stem) for j, stem in enumerate(inputs)]
+            inputs = _alone(inputs, valve)
             values = run.responses.forced(output, inputs)[:, 0]
         on_samples = Lag.simulate_grid(lags[:, None], values, float(values[0]), step)
         if plants:
@@ -83,6 +80,23 @@ def beyond_samples(
         else:
             parts.append(-0.5 * np.diff(on_samples, axis=0, prepend=on_samples[:1]))
     return end_to_end(parts)
+
+
+def _equation(run: "FreeRun", output: int) -> Changeable | None:
+    process = run.model.process
+    inner = process.inner if isinstance(process, AlteredProcess) else process
+    return Changeable(inner.equations[output]) if isinstance(inner, ArxProcess) else None
+
+
+def _behind(run: "FreeRun", output: int, own: ArxOutput) -> Responses:
+    """Return the responses of the process with another equation of an output."""
+    step = run.runs.sample_time
+    return responses_of(with_equation(run.model.process, output, own, step), step)
+
+
+def _alone(inputs: list[FloatArray], valve: int) -> list[FloatArray]:
+    """Return what enters the process, all but one valve at rest."""
+    return [stem if j == valve else np.zeros_like(stem) for j, stem in enumerate(inputs)]
 
 
 def _of(run: "FreeRun", output: int, lag: Lag, valve: int | None = None) -> FloatArray:
@@ -122,6 +136,23 @@ def _a_sample_late(run: "FreeRun", output: int, valve: int) -> FloatArray:
     for rows in run.runs.slices:
         later[rows][1:] = moves[rows][:-1]
     return run.slope(output, valve, np.hstack([moves, moves + later]))
+
+
+def _half_a_sample_late(run: "FreeRun", output: int, valve: int) -> FloatArray:
+    """Return what an output lacks where a stem's moves come half a sample late, shape (N, ≤ 1).
+
+    That is not half of what it lacks by a whole sample; nothing is told of it where the process is
+    no equation.
+    """
+    equation = _equation(run, output)
+    if equation is None:
+        return np.zeros((len(run.runs), 0))
+    late = np.array([0.5 * (figure.what == DELAY) for figure in equation.figures])
+    plant, parts = _behind(run, output, equation.changed(late)), []
+    for rows in run.runs.slices:
+        inputs = _alone(run.inputs(rows), valve)
+        parts.append(plant.forced(output, inputs) - run.responses.forced(output, inputs))
+    return end_to_end(parts)
 
 
 def _in_process(model: LoopModel, output: int) -> tuple[Behaviour, ...]:
