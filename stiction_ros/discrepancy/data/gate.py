@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.filled import drawn, held
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
-from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE, OFTEN, OUTLYING, TRACE
+from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE, OFTEN, OUTLYING, TRACE, TRIED
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
 from stiction_ros.effects.behaviour import BoolArray, IntArray
@@ -277,19 +277,16 @@ def _surprise(runs: Runs, output: int) -> float:
 
 
 def _alone(values: FloatArray) -> BoolArray:
-    """Return samples far off both neighbours, which are near each other: one, or two in a row."""
-    found = np.zeros(len(values), dtype=bool)
-    if len(values) < 4:
-        return found
-    beside = 0.5 * (values[:-2] + values[2:])
-    away, apart = np.abs(values[1:-1] - beside), np.abs(values[2:] - values[:-2])
-    scale = max(float(np.median(away)), TRACE * float(np.ptp(values)))
-    found[1:-1] = (away > OUTLYING * scale) & (apart < 0.5 * away)
-    beside, apart = 0.5 * (values[:-3] + values[3:]), np.abs(values[3:] - values[:-3])
-    away = np.minimum(np.abs(values[1:-2] - beside), np.abs(values[2:-1] - beside))
-    pairs = (away > OUTLYING * scale) & (apart < 0.5 * away)
-    found[1:-2] |= pairs
-    found[2:-1] |= pairs
+    """Return samples far off both neighbours, which are near each other: up to three in a row."""
+    found, scale = np.zeros(len(values), dtype=bool), TRACE * float(np.ptp(values))
+    for count in range(1, min(TRIED, len(values) - 1)):
+        first, last = values[: -count - 1], values[count + 1 :]
+        inside = np.stack([values[k : k + len(first)] for k in range(1, count + 1)])
+        away, apart = np.abs(inside - 0.5 * (first + last)).min(axis=0), np.abs(last - first)
+        scale = max(float(np.median(away)), scale)
+        far = (away > OUTLYING * scale) & (apart < 0.5 * away)
+        for k in range(1, count + 1):
+            found[k : k + len(far)] |= far
     return found
 
 
