@@ -109,7 +109,10 @@ def settled(
     coordinates: FloatArray,
     ar: Mapping[int, FloatArray],
 ) -> FloatArray:
-    """Return points with their linear figures at their best under given φ, shape (G, axes)."""
+    """Return points with their linear figures at their best under given φ, shape (G, axes).
+
+    A figure of which the rows tell next to nothing stays near 0: its range is its deviation.
+    """
     moved = coordinates.copy()
     for d, axis in enumerate(candidate.axes):
         if not axis.linear:
@@ -123,7 +126,7 @@ def settled(
         scores = [np.where(kept, score, 0.0) for score in scores]
         rows = sum(base.noise[i].rows for i in response.outputs)
         low, middle, high = np.exp((np.array(scores) - np.min(scores, axis=0)) / max(rows, 1))
-        bend = np.maximum(low - 2.0 * middle + high, TINY)
+        bend = np.maximum(low - 2.0 * middle + high, 0.0) + 2.0 * PROBE**2 / max(rows, 1)
         vertex = np.clip(0.5 * PROBE * (low - high), -bend, bend) / bend
         moved[:, d] = np.where(kept, vertex * axis.high, coordinates[:, d])
     return moved

@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise, seen_noise
-from stiction_ros.discrepancy.measures import LARGER
+from stiction_ros.discrepancy.measures import LARGER, TRACE
 from stiction_ros.effects import FloatArray
 
 
@@ -36,16 +36,18 @@ def levelled(base: Baseline) -> Baseline:
     """Return the model with the level and the start that suit the free run best.
 
     The likelihood of noise with a long memory hardly sees them, and a free run with its figures may
-    stand anywhere.
+    stand anywhere. What leaves no trace in the rows that are fitted stays as it is.
 
     Args:
         base: the model.
     """
     noises = []
     for noise, columns, blocks in zip(base.noise, base.columns, base.blocks, strict=True):
-        rows = blocks.train
-        shift = np.linalg.lstsq(columns[rows], noise.residual[rows], rcond=None)[0]
-        noises.append(dataclasses.replace(noise, residual=noise.residual - columns @ shift))
+        sizes = np.linalg.norm(columns[blocks.scored], axis=0)
+        scaled = columns / np.where(sizes > 0.0, sizes, 1.0)
+        rows, left = blocks.train, noise.residual
+        shift = np.linalg.lstsq(scaled[rows], left[rows], rcond=TRACE)[0]
+        noises.append(dataclasses.replace(noise, residual=left - scaled @ shift))
     return dataclasses.replace(base, noise=tuple(noises))
 
 
