@@ -1,10 +1,7 @@
 """After the looks: whole explanations compared, and each effect told again beside the others."""
 
 import dataclasses
-import itertools
-from collections.abc import Sequence
 
-from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.decision.decide import (
     FRICTION,
     confirmed,
@@ -13,11 +10,11 @@ from stiction_ros.discrepancy.decision.decide import (
 )
 from stiction_ros.discrepancy.decision.explanation import AddedEffect
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.discrepancy.measures import MARGIN, QUARTER, SURE, TRIED
+from stiction_ros.discrepancy.measures import MARGIN, SURE, TRIED
 from stiction_ros.discrepancy.steps.look import look_on, scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import best_whole, mended
-from stiction_ros.effects import Backlash, StepDisturbance, about
+from stiction_ros.effects import about
 
 Keys = tuple[tuple[str, str], ...]  # places and effects
 
@@ -33,36 +30,7 @@ def settle(task: Task, state: State) -> State:
 
 def best_of_wholes(task: Task, state: State) -> State:
     """Keep the best whole explanation: what was found, or a part of it."""
-    best = best_whole(state.now, task.options.margin)
-    kept = without_slips(best.effects)
-    return dataclasses.replace(
-        state, now=best.refitted(kept) if len(kept) < len(best.effects) else best
-    )
-
-
-def without_slips(effects: Sequence[AddedEffect]) -> tuple[AddedEffect, ...]:
-    """Return effects without pairs of opposite load steps beside a friction, within its band.
-
-    They are a slip at another place than the law says, and the next slip.
-    """
-    frictions = [each for each in effects if about(each.effect).family == FRICTION]
-    bands = {each.place.replace("valve:", "load:"): band_of(each) for each in frictions}
-    steps = [e for e in effects if e.effect == StepDisturbance.effect and e.place in bands]
-    for one, other in itertools.combinations(steps, 2):
-        first, second = float(one.fit.factors[0]), float(other.fit.factors[0])
-        larger = max(abs(first), abs(second))
-        slips = larger <= bands[one.place] and abs(first + second) <= QUARTER * larger
-        if slips and one.place == other.place:
-            return without_slips([e for e in effects if e is not one and e is not other])
-    return tuple(effects)
-
-
-def band_of(friction: AddedEffect) -> float:
-    """Return how far apart a stem may rest under the same OP, %."""
-    figures = figures_of(friction.behaviour)
-    if friction.effect == Backlash.effect:
-        return figures["band"]
-    return figures["f_s"] + figures["f_d"]
+    return dataclasses.replace(state, now=best_whole(state.now, task.options.margin))
 
 
 def told_again(task: Task, state: State) -> State:
