@@ -287,7 +287,7 @@ def test_values_on_a_coarse_lattice_or_at_an_end_are_not_thinned_out() -> None:
     assert not thinned(np.minimum(values, np.quantile(values, 0.8)), 1e-9)
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", [1, 2, 3])
 def test_samples_that_stand_alone_are_not_scored(count: int) -> None:
     model, recorded = loop(), record(loop())
     pv = recorded.pv.copy()
