@@ -72,7 +72,6 @@ class Model:
 
     @property
     def orders(self) -> Orders:
-        """Orders of the fits."""
         return self.fits[0].orders
 
     @property

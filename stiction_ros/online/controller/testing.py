@@ -45,7 +45,6 @@ class ValveTestingController(LiveController):
 
     @property
     def mode(self) -> ControlMode:
-        """Mode in force."""
         return super().mode if self._running is None else ControlMode.VALVE_TEST
 
     @property

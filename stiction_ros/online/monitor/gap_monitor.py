@@ -73,7 +73,6 @@ class GapLook:
 
     @property
     def text(self) -> str:
-        """One sentence."""
         worst = self.worst
         if worst is None:
             return self.failure
