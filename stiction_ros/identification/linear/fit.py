@@ -133,8 +133,9 @@ def _best(data: LinearData, options: LinearOptions, progress: Progress | None) -
     """Return the better of the least delays and of those that ARX equations show."""
     low, high = options.delay
     tried = [(low,) * len(data.valves)]
-    if high > low:
-        tried.append(valve_delays(data, low, high))
+    if high > low:  # of equations of second order, those whose free runs fit best
+        rows = [_delays(data, output, low, high) for output in range(len(data.outputs))]
+        tried.append(tuple(int(delay) for delay in np.min(rows, axis=0)))
     choices, longest = [], max(map(max, tried))
     for delay in tried:  # on one window
         late = longest - max(delay)
@@ -147,15 +148,6 @@ def _best(data: LinearData, options: LinearOptions, progress: Progress | None) -
         return choice.status is not LinearStatus.OK, choice.taken.value(options.criterion)
 
     return min(choices, key=rank)
-
-
-def valve_delays(data: LinearData, low: int, high: int) -> tuple[int, ...]:
-    """Return the delay of every valve, ``low`` to ``high`` samples, to the output that is first.
-
-    By ARX equations of second order whose free runs fit best.
-    """
-    rows = [_delays(data, output, low, high) for output in range(len(data.outputs))]
-    return tuple(int(delay) for delay in np.min(rows, axis=0))
 
 
 def _delays(data: LinearData, output: int, low: int, high: int) -> tuple[int, ...]:
