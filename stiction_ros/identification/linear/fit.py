@@ -4,13 +4,13 @@ import dataclasses
 import functools
 import os
 import time
-from collections.abc import Callable
 
 import numpy as np
 
 from stiction_ros.checks import of_kind, one_of
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.identification.identification_options import Progress
 from stiction_ros.identification.linear.data import (
     LinearData,
     LinearStatus,
@@ -35,7 +35,6 @@ MAX_RADIUS = 0.9995
 """Largest root of A: the pole of an integrator that is fitted lies as near to 1 as this."""
 MARGIN = 2.0
 """Of delays whose log likelihoods, times −2, differ by less, the longest is kept."""
-Progress = Callable[[float], None]
 
 
 @dataclasses.dataclass(frozen=True)
