@@ -92,10 +92,6 @@ def content(path: Path, module: str) -> str:
 
     These are the files of its own package from which it imports, and theirs in turn where they
     hold compiled functions: machine code has the functions that it calls, and the constants.
-
-    Args:
-        path: of a module.
-        module: its full name.
     """
     depth = len(module.split("."))
     root = path.resolve().parents[depth - 1] if depth <= len(path.parents) else path.parent

@@ -175,20 +175,16 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     return top
 
 
-def _show_log() -> None:
-    log = logging.getLogger("stiction_ros")
-    if not any(isinstance(handler, _OnError) for handler in log.handlers):
-        log.addHandler(_OnError())
-        log.setLevel(logging.INFO)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Returns:
         0 done, 1 failed, 2 unusable input, 130 interrupted.
     """
-    _show_log()
+    log = logging.getLogger("stiction_ros")
+    if not any(isinstance(handler, _OnError) for handler in log.handlers):
+        log.addHandler(_OnError())
+        log.setLevel(logging.INFO)
     given = sys.argv[1:] if arguments is None else list(arguments)
     command = next((word for word in given if not word.startswith("-")), "")
     if not given:

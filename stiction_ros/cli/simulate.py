@@ -21,7 +21,6 @@ PRBS = "prbs"
 
 
 def add(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "simulate",
         description="Run a loop model in closed loop under the controller that it records "
@@ -53,7 +52,6 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command."""
     path = find_config(options.loop)
     model = LoopModel.load(path)
     schedule = None

@@ -193,7 +193,9 @@ class MpcController:
                 sample of a run.
         """
         begin = time.perf_counter()
-        trouble = _unusable(pv=pv, sp=sp, dv=dv)
+        given = {"a measurement": pv, "a set-point": sp, "a measured disturbance": dv}
+        bad = [name for name, values in given.items() if not np.isfinite(values).all()]
+        trouble = f"{bad[0]} is not finite" if bad else ""
         applied = self._take_in(pv, dv, applied, known)
         target: Target | None = None
         if not trouble and self._formulation is not None:
@@ -357,14 +359,6 @@ class MpcController:
         if proposal.status.failed:
             return None
         return formulation.optimality_gap(situation.state, target, situation.last, plan, samples)
-
-
-def _unusable(**values: FloatArray) -> str:
-    words = {"pv": "a measurement", "sp": "a set-point", "dv": "a measured disturbance"}
-    for key, value in values.items():
-        if not np.isfinite(value).all():
-            return f"{words[key]} is not finite"
-    return ""
 
 
 def _name(names: tuple[str, ...], number: int, kind: str) -> str:

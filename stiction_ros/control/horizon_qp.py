@@ -89,7 +89,10 @@ class HorizonQp:
         self.size = shape.shape[1]
         self._bounded = np.flatnonzero(np.isfinite(output_bounds).any(axis=1))
         self._output_bounds = output_bounds[self._bounded]
-        self._slack_weight = slack_weights(cost)[self._bounded]
+        # Of each output's squared slack, halved in the cost.
+        reach = (cost.forced_output**2).sum(axis=(0, 2))
+        scale = float(np.trace(cost.hessian)) / np.maximum(reach, 1e-300)
+        self._slack_weight = (SLACK_WEIGHT * cost.horizon * scale)[self._bounded]
         self._hard = Programme(shape.T @ cost.hessian @ shape, rows, iterations)
 
     @functools.cached_property
@@ -207,10 +210,3 @@ class HorizonQp:
             low = np.maximum(self._output_bounds[:, 0] - free, -1e30)
             soft.upper[first : first + count] = high.reshape(-1)
             soft.lower[first + count : first + 2 * count] = low.reshape(-1)
-
-
-def slack_weights(cost: HorizonCost) -> FloatArray:
-    """Return the weight, halved in the cost, of each output's squared slack, shape (p,)."""
-    reach = (cost.forced_output**2).sum(axis=(0, 2))
-    scale = float(np.trace(cost.hessian)) / np.maximum(reach, 1e-300)
-    return np.asarray(SLACK_WEIGHT * cost.horizon * scale)

@@ -19,7 +19,6 @@ class Delay(Behaviour):
 
     @property
     def samples(self) -> float:
-        """Delay in samples."""
         return float(getattr(self, self.parameters()[0].attribute))
 
     def rest(self, value: float) -> Memory:

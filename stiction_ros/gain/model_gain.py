@@ -58,7 +58,9 @@ def gain_of_model(
     """
     own_controller(model)  # refuses
     friction = next((e for e in model.valves[0].effects if isinstance(e, Friction)), None)
-    push = _push(model, friction)
+    band = 0.0 if friction is None else friction.static_friction + friction.dynamic_friction
+    last = model.process.linear(model.sample_time).step_responses(101)[-1, 0, 0]
+    push = float(last) * max(PUSHED * band, LEAST_PUSH)  # of PV, by a move of some bands
     if set_points is None:
         times, start = np.array([0.0, 20.0 * model.sample_time]), float(model.pv0[0])
         set_points = SetPoints(model.outputs, times, np.array([[start], [start + push]]))
@@ -143,10 +145,3 @@ def _embedding(model: LoopModel, friction: Friction | None, push: float, runs: R
         return Option(What.EMBEDDING, None, {}, f"It cannot be set up: {error}.")
     note = "Predictive control that knows the friction."
     return option_of(What.EMBEDDING, found, note, design.weights())
-
-
-def _push(model: LoopModel, friction: Friction | None) -> float:
-    """Return by how much PV moves when the stem moves by some bands, within a hundred samples."""
-    band = 0.0 if friction is None else friction.static_friction + friction.dynamic_friction
-    last = model.process.linear(model.sample_time).step_responses(101)[-1, 0, 0]
-    return float(last) * max(PUSHED * band, LEAST_PUSH)

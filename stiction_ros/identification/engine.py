@@ -2,7 +2,6 @@
 
 import dataclasses
 import time
-from collections.abc import Callable
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from stiction_ros.identification.conclusion import BELIEVED, conclude, evidence,
 from stiction_ros.identification.exact.intervals import friction_intervals
 from stiction_ros.identification.exact.neighbourhood import REJECTED, refine
 from stiction_ros.identification.exact.search import comb, improve, search
-from stiction_ros.identification.identification_options import IdentificationOptions
+from stiction_ros.identification.identification_options import IdentificationOptions, Progress
 from stiction_ros.identification.problem.models import (
     Data,
     Model,
@@ -33,8 +32,6 @@ from stiction_ros.identification.result import (
 )
 from stiction_ros.identification.switching import require_cells
 from stiction_ros.records.record import Record
-
-Progress = Callable[[float], None]
 
 
 def identify_exact(

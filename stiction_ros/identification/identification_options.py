@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from stiction_ros.errors import InputError
 LOOP_KINDS = ("flow", "pressure", "level", "temperature", "analyser")
 METHODS = ("exact", "evidence")
 AUTO = "auto"
+Progress = Callable[[float], None]  # called with the share done, 0 to 1
 
 
 def limited(span: FloatArray, limit: float | tuple[float, ...] | None) -> FloatArray:

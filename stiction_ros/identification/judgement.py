@@ -113,7 +113,6 @@ class Figures:
     )
 
     def to_dict(self) -> dict[str, float]:
-        """Return the figures by name."""
         return dataclasses.asdict(self)
 
 

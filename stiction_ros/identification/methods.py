@@ -10,14 +10,13 @@ import os
 from collections.abc import Callable
 
 from stiction_ros.checks import of_kind
-from stiction_ros.identification.identification_options import IdentificationOptions
+from stiction_ros.identification.identification_options import IdentificationOptions, Progress
 from stiction_ros.identification.problem.input_checks import refuse_swapped
 from stiction_ros.identification.result import Identification
 from stiction_ros.intake.intake import record_of
 from stiction_ros.one_thread import one_thread
 from stiction_ros.records.record import Record
 
-Progress = Callable[[float], None]
 Method = Callable[[Record, IdentificationOptions, Progress | None], Identification]
 
 

@@ -40,16 +40,11 @@ def append_effect(
         entries = document["process"].setdefault(
             "outputs", [{"name": name} for name in process.outputs]
         )
-    _entry(entries, tag).setdefault("effects", []).append(effect.to_mapping())
-
-
-def _entry(entries: list[dict[str, Any]], tag: str) -> dict[str, Any]:
-    """Return the entry of that name, a new one where a sensor has none yet."""
-    for entry in entries:
-        if entry["name"] == tag:
-            return entry
-    entries.append({"name": tag})
-    return entries[-1]
+    entry = next((entry for entry in entries if entry["name"] == tag), None)
+    if entry is None:  # a sensor may have none yet
+        entry = {"name": tag}
+        entries.append(entry)
+    entry.setdefault("effects", []).append(effect.to_mapping())
 
 
 def read_effects(section: Section, place: str) -> tuple[Behaviour, ...]:

@@ -116,7 +116,10 @@ class Plant:
         OP and stems are kept within the valves' limits.
         """
         time = self._now.time
-        self._change_valves(time)
+        while self._changes and self._changes[0].time <= time + 1e-9:
+            change = self._changes.pop(0)
+            j = self.model.valve_names.index(change.valve)
+            self._valves[j] = _Chain(change.effects, float(self._stem[j]), self._random_effects)
         stem = np.empty(len(self._valves))
         for j, (chain, (low, high)) in enumerate(zip(self._valves, self._limits, strict=True)):
             asked = min(max(float(op[j]), low), high)
@@ -132,12 +135,6 @@ class Plant:
         self.sample += 1
         self._now = self._look()
         return stem
-
-    def _change_valves(self, time: float) -> None:
-        while self._changes and self._changes[0].time <= time + 1e-9:
-            change = self._changes.pop(0)
-            j = self.model.valve_names.index(change.valve)
-            self._valves[j] = _Chain(change.effects, float(self._stem[j]), self._random_effects)
 
     def _look(self) -> Measurement:
         process = self.model.process

@@ -104,7 +104,6 @@ class Section:
         return value
 
     def choice(self, key: str, choices: tuple[str, ...], default: Any = _REQUIRED) -> str:
-        """Return one of ``choices``."""
         return one_of(self.text(key, default), choices, self.at(key))
 
     def number(

@@ -92,7 +92,6 @@ class Listener:
         self._inlets: list[Inlet] = []
 
     def run(self, seconds: float, progress: Callable[[float], None]) -> None:
-        """Listen for ``seconds``."""
         begin = search = time.monotonic()
         while (now := time.monotonic()) - begin < seconds:
             if now >= search:
@@ -104,7 +103,6 @@ class Listener:
             time.sleep(LOOK)
 
     def close(self) -> None:
-        """Leave the graph."""
         self.node.destroy_node()
         try_shutdown()
 

@@ -1,7 +1,6 @@
 """The topics and the status of one bridged loop."""
 
 from array import array
-from collections.abc import Sequence
 
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -94,8 +93,9 @@ class LoopTopics:
             if bridge.op_port.counts[one] and one is not Reception.TAKEN
         ]
         values.append(("refused_tags", len(bridge.refused)))
-        bad = told_of(bridge.refused) or self._bad_values()
-        if bad:
+        refused, more = bridge.refused[:SHOWN], len(bridge.refused) - SHOWN
+        said = "; ".join((*refused, f"and {more} more") if more > 0 else refused)
+        if bad := said or self._bad_values():
             return "error", bad, values
         if bridge.rules.writes:
             values += bridge.rate_watch.keys()
@@ -115,12 +115,6 @@ class LoopTopics:
             if not np.isfinite(value)
         ]
         return "PV not usable: " + ", ".join(found) if found else ""
-
-
-def told_of(refused: Sequence[str]) -> str:
-    """Return the first refused tags in one line; empty for none."""
-    more = len(refused) - SHOWN
-    return "; ".join((*refused[:SHOWN], *([f"and {more} more"] if more > 0 else [])))
 
 
 def grant_keys(grant: Grant) -> list[tuple[str, object]]:

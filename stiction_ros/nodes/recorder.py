@@ -234,12 +234,7 @@ class RecorderNode(ManagedNode):
 
 
 def free_directory(wanted: Path, written: Collection[Path]) -> Path:
-    """Return where the next bag goes: where it is wanted, or beside an earlier one of this node.
-
-    Args:
-        wanted: by the parameter.
-        written: by this node before.
-    """
+    """Return where the next bag goes: where it is wanted, or beside an earlier one of this node."""
     if wanted not in written or not wanted.exists():
         return wanted
     beside = (wanted.with_name(f"{wanted.name}_{number}") for number in itertools.count(2))

@@ -155,7 +155,6 @@ class LoopEstimator:
         return [Notice(f"tags of {kind}", "warn", text)]
 
     def add(self, found: PairedSample) -> list[Told]:
-        """Take in one sample."""
         settings = self.settings
         if self.live is None or self.monitor is None:
             loop = (settings.loop, self.tags["op"], self.tags["pv"], settings.sample_time)

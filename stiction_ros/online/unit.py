@@ -104,9 +104,6 @@ class UnitScenario:
 def load_scenario(path: Path | str) -> Scenario | UnitScenario:
     """Read a scenario file of one loop or of several.
 
-    Args:
-        path: the file.
-
     Raises:
         InputError: anything missing or wrong, in one line.
     """

@@ -29,7 +29,6 @@ class Grant:
 
     @property
     def may_write(self) -> bool:
-        """Whether an OP may be written."""
         return self.state is GrantState.GRANTED
 
     def ask(self) -> "Grant":

@@ -174,7 +174,10 @@ class LoopSampler:
             if not ready and present < self._next + self.tags.sample_ns // SETTLE:
                 break
             if ready and present > self._next + LOST * self.tags.sample_ns:
-                self._skip(present)
+                # A held value would tell of none of the samples that were lost.
+                lost = (present - self._next) // self.tags.sample_ns
+                self.counts["skipped"] += lost
+                self._next += lost * self.tags.sample_ns
                 continue
             found.append(self._close(self._next, alive))
             self._closed, self._next = self._next, self._next + self.tags.sample_ns
@@ -248,13 +251,6 @@ class LoopSampler:
         if self._beside >= SUCCESSION:
             self._next += beside
             self._beside = 0
-
-    def _skip(self, present: int) -> None:
-        """Leave out samples that were lost, as a held value would tell of none of them."""
-        assert self._next is not None
-        lost = (present - self._next) // self.tags.sample_ns
-        self.counts["skipped"] += lost
-        self._next += lost * self.tags.sample_ns
 
     # ---- samples ---------------------------------------------------------------------------
 

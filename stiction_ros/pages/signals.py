@@ -249,7 +249,6 @@ class Window:
 
     @property
     def rows(self) -> slice:
-        """Its rows."""
         return slice(self.first, self.last)
 
     def named(self, sample_time: float) -> str:

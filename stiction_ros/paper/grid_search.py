@@ -6,12 +6,12 @@ mean SE (14) wins. Nothing is shared between points: this is the baseline.
 """
 
 import itertools
-from collections.abc import Callable
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.identification.identification_options import Progress
 from stiction_ros.paper import one_step_result as one_step
 from stiction_ros.paper.one_step_result import EquationError, fit_outputs
 from stiction_ros.paper.paper_options import PaperOptions
@@ -21,7 +21,6 @@ from stiction_ros.signals.arx_fit import ArxOrders, Delays
 
 MAX_POINTS = 2_000_000
 MAX_CHOICES = 20_000
-Progress = Callable[[float], None]
 
 
 def nodes(limit: float, step: float) -> FloatArray:

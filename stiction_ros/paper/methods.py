@@ -1,14 +1,12 @@
 """PaperIdentification by the paper's methods: ``nlp``, ``nlp_printed`` and ``grid``."""
 
 import time
-from collections.abc import Callable
 
+from stiction_ros.identification.identification_options import Progress
 from stiction_ros.identification.problem.input_checks import refuse_swapped
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.search_log import PaperIdentification
 from stiction_ros.records import Record
-
-Progress = Callable[[float], None]
 
 
 def identify(

@@ -60,7 +60,6 @@ class PaperOptions:
 
 
 def _flat(orders: OutputOrders | InputOrders | None) -> tuple[int | None, ...]:
-    """Return all single orders."""
     if orders is None or isinstance(orders, int):
         return (orders,)
     return tuple(one for entry in orders for one in _flat(entry))

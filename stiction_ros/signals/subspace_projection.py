@@ -103,7 +103,10 @@ def _oblique(
     mapping = l32 @ np.linalg.pinv(l22, rcond=RANK)
     weight, body = np.eye(len(future)), mapping @ np.hstack([l21, l22])
     if method is SubspaceMethod.CVA:
-        weight = _inverse_root(np.hstack([l32, l33]))
+        # The symmetric inverse square root of F Fᵀ on its range, for F = (l32, l33).
+        left, values, _ = np.linalg.svd(np.hstack([l32, l33]), full_matrices=False)
+        keep = values > RANK * values[0]
+        weight = (left[:, keep] / values[keep]) @ left[:, keep].T
         body = weight @ l32
     left, values, _ = np.linalg.svd(body, full_matrices=False)
     return mapping, left, values, weight
@@ -123,10 +126,3 @@ def _predictor(u: FloatArray, y: FloatArray, s: int) -> tuple[FloatArray, FloatA
         mapping[j * p : (j + 1) * p, j * q :] = markov[:, : (s - j) * q]
     left, values, _ = np.linalg.svd(mapping @ l22, full_matrices=False)
     return mapping, left, values
-
-
-def _inverse_root(factor: FloatArray) -> FloatArray:
-    """Return the symmetric inverse square root of F Fᵀ on its range."""
-    left, values, _ = np.linalg.svd(factor, full_matrices=False)
-    keep = values > RANK * values[0]
-    return np.asarray((left[:, keep] / values[keep]) @ left[:, keep].T)

@@ -44,7 +44,6 @@ class NodeProcesses:
         self._moved = time.monotonic()
 
     def start(self) -> None:
-        """Start every node."""
         environment = ros_environment()
         (self.directory / "log").mkdir(exist_ok=True)
         for name in self._names:

@@ -119,13 +119,7 @@ def sentence_by_kind(kind: str, answer: StepAnswer) -> str:
 
 
 def experiment_for(record: Record, found: Identification, valve: int) -> str:
-    """Return why a valve is undecided and what would decide, in sentences.
-
-    Args:
-        record: what was measured.
-        found: what identification made of it.
-        valve: index of one that is undecided.
-    """
+    """Return why a valve is undecided and what would decide, in sentences."""
     estimate = found.valves[valve]
     said = (
         _reason(estimate, float(np.ptp(record.op[:, valve]))),

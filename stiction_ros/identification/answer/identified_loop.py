@@ -35,11 +35,6 @@ def identified_loop(record: Record, found: Identification, name: str) -> LoopMod
     the mean and starts there. No range of the instruments is written: a record shows where PV
     was, not where it may be.
 
-    Args:
-        record: what was measured.
-        found: what identification made of it.
-        name: tag of the loop.
-
     Raises:
         InputError: there is no model, or the process grows without end.
     """

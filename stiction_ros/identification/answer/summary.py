@@ -142,12 +142,7 @@ def cycle(model: OutputModel) -> str:
 
 
 def why(found: Identification, valve: int) -> str:
-    """Return in a sentence why a valve is said to be what it is said to be.
-
-    Args:
-        found: what identification made of the record.
-        valve: index.
-    """
+    """Return in a sentence why a valve is said to be what it is said to be."""
     estimate = found.valves[valve]
     name, kind = estimate.name, estimate.verdict
     band = estimate.static_friction + estimate.dynamic_friction
@@ -181,12 +176,7 @@ def materiality(estimate: ValveEstimate) -> str:
 
 
 def next_step(found: Identification, valve: int) -> str:
-    """Return what to do next about a valve.
-
-    Args:
-        found: what identification made of the record.
-        valve: index.
-    """
+    """Return what to do next about a valve."""
     estimate = found.valves[valve]
     if estimate.verdict is VerdictKind.UNDECIDED:
         step = estimate.experiment.partition(". ")[2] or "Record the loop for longer."

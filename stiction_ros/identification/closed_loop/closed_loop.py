@@ -91,10 +91,6 @@ def close_loop(record: Record, found: Identification) -> ClosedLoop:
 
     Control is taken as decentralised: one valve per controller and output, paired by how much
     of OP the output explains.
-
-    Args:
-        record: what was measured.
-        found: what identification made of it.
     """
     loop = scaled(record, found.stem) if found.status is FitStatus.OK else None
     if loop is None:

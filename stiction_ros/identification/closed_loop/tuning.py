@@ -70,11 +70,7 @@ class Tuning:
 
 
 def tunings(record: Record) -> tuple[Tuning | None, ...]:
-    """Return for each output the controller that reads it; None where none is believed.
-
-    Args:
-        record: what was measured.
-    """
+    """Return for each output the controller that reads it; None where none is believed."""
     none: list[Tuning | None] = [None] * len(record.outputs)
     loop = scaled(record, record.op)
     if loop is None:

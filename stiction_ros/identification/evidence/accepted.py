@@ -51,14 +51,7 @@ class Accepted:
 
 
 def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> Accepted:
-    """Hold frictions near the best, and all that the search met, against the best.
-
-    Args:
-        problem: the record.
-        found: by the search.
-        valve: index.
-        confidence: level of the intervals.
-    """
+    """Hold frictions near the best, and all that the search met, against the best."""
     gain = found.without[valve].loss - found.best.loss
     slack = chi2_quantile(confidence, FREEDOM) + MISFIT * max(gain, 0.0)
     judge = Judge.of(problem, found.best, valve, found.best.fits, held=True)

@@ -31,7 +31,7 @@ from stiction_ros.identification.evidence.rates import (
 )
 from stiction_ros.identification.evidence.sensor_hold import hold_notes
 from stiction_ros.identification.friction import find_law, simulate
-from stiction_ros.identification.identification_options import IdentificationOptions
+from stiction_ros.identification.identification_options import IdentificationOptions, Progress
 from stiction_ros.identification.judgement import Figures, friction_probability, verdict_of
 from stiction_ros.identification.problem.models import (
     Data,
@@ -51,8 +51,6 @@ from stiction_ros.identification.result import (
 from stiction_ros.identification.result import Look as View
 from stiction_ros.records.record import Record
 from stiction_ros.signals.autoregression import innovations
-
-Progress = Callable[[float], None]
 
 
 def identify_by_evidence(

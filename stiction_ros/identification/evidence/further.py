@@ -20,11 +20,7 @@ FURTHER_LAW_ROUNDS = 2
 
 
 def settled(problem: Problem) -> tuple[tuple[float, ...], ...]:
-    """Return the values at which the law's further parameters are held, per valve.
-
-    Args:
-        problem: a record at its own rate.
-    """
+    """Return the values at which the law's further parameters are held, per valve."""
     (law,) = set(problem.laws)
     first = first_values(law)
     if not searched(law):

@@ -42,7 +42,11 @@ def with_own_laws(seen: Looks, options: IdentificationOptions) -> tuple[Looks, t
 
 
 def _with_own_law(seen: Looks, valve: int, options: IdentificationOptions) -> tuple[Looks, str]:
-    rates = _best_rates(seen, valve)
+    # The rate that shows most of those that agree best, and its better neighbour.
+    look = agreement(seen, valve).look
+    at = next(k for k, one in enumerate(seen) if one is look)
+    beside = [k for k in (at - 1, at + 1) if 0 <= k < len(seen)]
+    rates = (at, *sorted(beside, key=lambda k: -seen[k].beyond_price(valve))[:1])
     if min(seen[k].beyond_price(valve) for k in rates) <= 0.0:
         return seen, ""
     first = seen[0].problem.laws[valve]
@@ -62,19 +66,11 @@ def _with_own_law(seen: Looks, valve: int, options: IdentificationOptions) -> tu
         return seen, ""
     gain = min(seen[k].found.best.loss - best[k].best.loss for k in rates)
     clause = f"law {chosen.law} explains PV better than {first.law} by {gain / 2.0:.0f} nats"
-    others, at = [name for name in NAMED if name != chosen.law], rates[0]
+    others = [name for name in NAMED if name != chosen.law]
     alike = [name for name in others if _alike(seen[at], valve, find_law(name), best[at].best)]
     if alike:
         clause += f"; {' and '.join(alike)} cannot be told from it by this record"
     return _under(seen, valve, chosen, best, options), clause
-
-
-def _best_rates(seen: Looks, valve: int) -> tuple[int, ...]:
-    """Return the rate that shows most of those that agree best, and its better neighbour."""
-    look = agreement(seen, valve).look
-    at = next(k for k, one in enumerate(seen) if one is look)
-    beside = [k for k in (at - 1, at + 1) if 0 <= k < len(seen)]
-    return (at, *sorted(beside, key=lambda k: -seen[k].beyond_price(valve))[:1])
 
 
 def _searched(look: Look, valve: int, law: Law, seeds: Sequence[Candidate]) -> Found:

@@ -62,10 +62,6 @@ def echo(problem: Problem, candidate: Candidate) -> float:
     n innovations, or its weighted mean over three lags. Where they are white the most of a thousand
     lags exceeds 20 in one record of 250. Where they are not, neither valve nor noise says why:
     another loop cycles, or a load swings at no exact time, in time with which OP moves as well.
-
-    Args:
-        problem: the record at one rate.
-        candidate: whose fits are judged.
     """
     longest = int(LONGEST * problem.rows)
     return max(

@@ -49,12 +49,7 @@ class OutsideWave:
 
 
 def outside_wave(problems: Sequence[Problem], output: int) -> OutsideWave | None:
-    """Return the wave that gains most at any rate, None where none is believed.
-
-    Args:
-        problems: one record at several rates.
-        output: index.
-    """
+    """Return the wave that gains most at any rate of one record, None where none is believed."""
     found = [wave for problem in problems if (wave := _strongest(problem, output)) is not None]
     best = max(found, key=lambda wave: wave.gain, default=None)
     return best if best is not None and best.gain > LINE else None

@@ -4,13 +4,13 @@ import dataclasses
 import functools
 import os
 import time
-from collections.abc import Callable
 
 import numpy as np
 
 from stiction_ros.checks import of_kind, one_of
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.identification.identification_options import Progress
 from stiction_ros.identification.linear.data import (
     LinearData,
     LinearStatus,
@@ -35,7 +35,6 @@ MAX_RADIUS = 0.9995
 """Largest root of A: the pole of an integrator that is fitted lies as near to 1 as this."""
 MARGIN = 2.0
 """Of delays whose log likelihoods, times −2, differ by less, the longest is kept."""
-Progress = Callable[[float], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,8 +132,9 @@ def _best(data: LinearData, options: LinearOptions, progress: Progress | None) -
     """Return the better of the least delays and of those that ARX equations show."""
     low, high = options.delay
     tried = [(low,) * len(data.valves)]
-    if high > low:
-        tried.append(valve_delays(data, low, high))
+    if high > low:  # of equations of second order, those whose free runs fit best
+        rows = [_delays(data, output, low, high) for output in range(len(data.outputs))]
+        tried.append(tuple(int(delay) for delay in np.min(rows, axis=0)))
     choices, longest = [], max(map(max, tried))
     for delay in tried:  # on one window
         late = longest - max(delay)
@@ -147,15 +147,6 @@ def _best(data: LinearData, options: LinearOptions, progress: Progress | None) -
         return choice.status is not LinearStatus.OK, choice.taken.value(options.criterion)
 
     return min(choices, key=rank)
-
-
-def valve_delays(data: LinearData, low: int, high: int) -> tuple[int, ...]:
-    """Return the delay of every valve, ``low`` to ``high`` samples, to the output that is first.
-
-    By ARX equations of second order whose free runs fit best.
-    """
-    rows = [_delays(data, output, low, high) for output in range(len(data.outputs))]
-    return tuple(int(delay) for delay in np.min(rows, axis=0))
 
 
 def _delays(data: LinearData, output: int, low: int, high: int) -> tuple[int, ...]:

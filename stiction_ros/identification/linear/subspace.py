@@ -56,7 +56,6 @@ class OrderRival:
         return len(self.model.a)
 
     def value(self, criterion: OrderCriterion) -> float:
-        """Return the criterion's value."""
         return self.aic if criterion is OrderCriterion.AIC else self.bic
 
     def to_dict(self) -> dict[str, Any]:
@@ -126,7 +125,6 @@ def choose_order(
 def _judge(
     taken: OrderRival, rivals: list[OrderRival], criterion: OrderCriterion
 ) -> tuple[LinearStatus, str]:
-    """Return status and reason of the order taken."""
     if taken.model.radius >= 1.0:
         reason = f"largest pole |λ| = {taken.model.radius:.4f}; try another order"
         return LinearStatus.UNSTABLE, reason

@@ -22,17 +22,12 @@ def require_signals(record: Record) -> None:
     require_motion(record, "pv", record.pv, record.outputs)
 
 
-def require_whole(record: Record) -> None:
-    """Refuse a record with gaps or bad samples."""
+def require_tags(record: Record) -> None:
+    """Refuse a record with gaps or bad samples, or without valves or outputs."""
     if record.gaps or (record.quality == Quality.BAD).any():
         raise InputError(
             "has gaps or bad samples", where=record.name, fix="take one of its good parts"
         )
-
-
-def require_tags(record: Record) -> None:
-    """Refuse a record with gaps, or without valves or outputs."""
-    require_whole(record)
     if not record.valves or not record.outputs:
         raise InputError("needs at least one valve and one output", where=record.name)
 

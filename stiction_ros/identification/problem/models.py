@@ -15,13 +15,11 @@ from stiction_ros.identification.kernels.scan import best_apart
 from stiction_ros.identification.problem.output_error import Orders, OutputFit, fit_output
 from stiction_ros.identification.problem.scan import OutputScan
 from stiction_ros.identification.switching import StepSignals
+from stiction_ros.signals.arx_fit import Delays
 
 DELAY_MARGIN = 10.8
 FEWEST_MOVES = 6  # of a stem, from which anything may be concluded
 EQUAL = 3.84
-
-
-AllDelays = tuple[tuple[int, ...], ...]
 
 
 class Criterion(enum.Enum):
@@ -72,7 +70,6 @@ class Model:
 
     @property
     def orders(self) -> Orders:
-        """Orders of the fits."""
         return self.fits[0].orders
 
     @property
@@ -194,7 +191,7 @@ def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model
 
 def _best_delays(
     data: Data, model: Model, orders: Orders, valve: int, criterion: Criterion
-) -> AllDelays:
+) -> Delays:
     """Return the model's delays with those of one valve at the least SE."""
     ranges = (data.delay,) * len(data.y)
     scans = output_scans(data, model, orders, valve, criterion, ranges)
@@ -203,7 +200,7 @@ def _best_delays(
     return with_delays(model.delays, valve, best)
 
 
-def improve_delays(data: Data, model: Model, tried: set[AllDelays] | None = None) -> Model:
+def improve_delays(data: Data, model: Model, tried: set[Delays] | None = None) -> Model:
     """Scan all delays of every channel with the stems fixed; keep what the exact fit favours.
 
     Args:

@@ -117,11 +117,6 @@ def further_round(facts: Facts, judgement: Judgement, pairs: int = PAIRS) -> Pla
     leaves possible; of rounds that tell as much it is the smallest. Where friction is sure to be
     there, it is to tell its size. It begins where the test began.
 
-    Args:
-        facts: of the loop.
-        judgement: of the rounds before.
-        pairs: of moves.
-
     Returns:
         None where the limits leave no such round.
     """

@@ -196,8 +196,11 @@ class Stamps:
             date, rest = _cut(cell)
             if rest not in known:
                 known[rest] = _clock(rest)
-            day, clock = self._dates.get(date), known[rest]
-            day = self._new(date) if day is None else day
+            if date not in self._dates:
+                read = _date(date)
+                self._dates[date] = _No.STRANGE if read is None else len(self._days)
+                self._days += [] if read is None else [read]
+            day, clock = self._dates[date], known[rest]
             if clock is not None:
                 clocks[row] = clock[0]
                 zones[row] = self._zones.setdefault(clock[1], len(self._zones))
@@ -208,13 +211,6 @@ class Stamps:
 
     def _keep(self, days: Any, clocks: NDArray[np.int64], zones: Any) -> None:
         self._pieces.append(tuple(np.broadcast_arrays(days, clocks, zones)))
-
-    def _new(self, date: str) -> int:
-        """Return the place of a date that was not there yet; of none ``STRANGE``."""
-        read = _date(date)
-        self._dates[date] = _No.STRANGE if read is None else len(self._days)
-        self._days += [] if read is None else [read]
-        return self._dates[date]
 
     def _day_numbers(
         self, days: NDArray[np.int64], clocks: NDArray[np.int64]

@@ -41,7 +41,6 @@ class Column:
     known: tuple[str, ...] = ()  # words of a mode, by their codes
 
     def rows(self, chosen: NDArray[np.intp] | FlagArray) -> "Column":
-        """Return some of its rows."""
         return dataclasses.replace(self, values=self.values[chosen], blank=self.blank[chosen])
 
 
@@ -74,7 +73,6 @@ class Block:
         return dataclasses.replace(self, columns={**self.columns, **columns})
 
     def rows(self, chosen: NDArray[np.intp] | FlagArray) -> "Block":
-        """Return some of its rows."""
         return dataclasses.replace(
             self,
             time=self.time[chosen],

@@ -69,7 +69,6 @@ class ManagedNode(LifecycleNode):
 
     @property
     def log(self) -> RcutilsLogger:
-        """The logger of the node."""
         log: RcutilsLogger = self.get_logger()
         return log
 

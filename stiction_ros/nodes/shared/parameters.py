@@ -29,7 +29,9 @@ _TYPES = {
 def declare(node: Node, cls: type[Any]) -> None:
     """Declare every setting of ``cls`` on ``node`` with its description and range."""
     for entry in settings_of(cls):
-        node.declare_parameter(entry.name, _default(entry), _descriptor(entry))
+        given = list(entry.default) if isinstance(entry.default, tuple) else entry.default
+        value = Parameter(entry.name, _TYPES[entry.kind], given).value if given != [] else [""]
+        node.declare_parameter(entry.name, value, _descriptor(entry))
 
 
 def read(node: Node, cls: type[Any]) -> Any:
@@ -74,11 +76,6 @@ def as_mapping(settings: Any) -> dict[str, Any]:
         name: list(value) if isinstance(value, tuple) else value
         for name, value in dataclasses.asdict(settings).items()
     }
-
-
-def _default(entry: Setting) -> Any:
-    value = list(entry.default) if isinstance(entry.default, tuple) else entry.default
-    return Parameter(entry.name, _TYPES[entry.kind], value).value if value != [] else [""]
 
 
 def _descriptor(entry: Setting) -> ParameterDescriptor:

@@ -92,7 +92,6 @@ class LiveController:
 
     @property
     def mode(self) -> ControlMode:
-        """Mode of the controller in force."""
         return self._controller.mode
 
     @property

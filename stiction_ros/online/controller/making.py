@@ -47,12 +47,6 @@ def design_for(
 ) -> ControlDesign:
     """Return ``design``, or that of the process of ``offered`` where it is to be adopted.
 
-    Args:
-        offered: what the estimator found.
-        loop: the loop that is controlled.
-        settings: of its controller.
-        design: in force.
-
     Raises:
         InputError: ``offered`` is the model of another loop.
     """

@@ -45,7 +45,6 @@ class ValveTestingController(LiveController):
 
     @property
     def mode(self) -> ControlMode:
-        """Mode in force."""
         return super().mode if self._running is None else ControlMode.VALVE_TEST
 
     @property
@@ -91,8 +90,8 @@ class ValveTestingController(LiveController):
         test = self._running
         if test is None:
             return super().step(pv, sp, dv, preview)
-        if reason := self._interruption(sp):
-            self._stop(reason)
+        if not self._ours or not np.array_equal(sp, self._sp):
+            self._stop("the set-point moved" if self._ours else "someone else has OP")
             return super().step(pv, sp, dv, preview)
         moved = self._in_force.copy()
         moved[self._valve] = test.next_op(float(pv[self._output]))
@@ -101,12 +100,6 @@ class ValveTestingController(LiveController):
             self._finish()
         mode, nothing = ControlMode.VALVE_TEST, np.zeros(len(pv))
         return StepResult(StepStatus.SOLVED, "", mode, moved, None, nothing, 0.0, "valve test")
-
-    def _interruption(self, sp: FloatArray) -> str:
-        """Return what ends the test before its next move; empty where it may go on."""
-        if not self._ours:
-            return "someone else has OP"
-        return "" if np.array_equal(sp, self._sp) else "the set-point moved"
 
     def _begin_test(self, pv: FloatArray, sp: FloatArray) -> None:
         """Begin a test with OP in force, or say why not; the other valves rest."""

@@ -57,7 +57,6 @@ class ValveTest:
         self._work: Future[Judgement] | None = None
 
     def stop(self, reason: str) -> None:
-        """End the test."""
         self.over = self.over or reason
 
     def next_op(self, pv: float) -> float:

@@ -80,7 +80,10 @@ class Reference:
         if found.stem.shape != record.op.shape or not found.outputs:
             return None
         outputs = []
-        first = _first_sure(found.stem, [v.static_friction > 0.0 for v in found.valves])
+        sticky = np.array([valve.static_friction > 0.0 for valve in found.valves], dtype=bool)
+        moved = found.stem[:, sticky] != found.stem[0, sticky]
+        # Every stem is known from its first move on.
+        first = int(max((np.argmax(column) for column in moved.T if column.any()), default=0))
         for model in found.outputs:
             pv = record.pv[first:, record.outputs.index(model.name)]
             one = _noise_of(model, record.valves, found.stem[first:], pv)
@@ -88,12 +91,6 @@ class Reference:
                 return None
             outputs.append(one)
         return cls(record.valves, tuple(outputs))
-
-
-def _first_sure(stem: FloatArray, sticky: Sequence[bool]) -> int:
-    """Return the sample from which every stem is known: that of its first move."""
-    moved = stem[:, np.array(sticky, dtype=bool)] != stem[0, np.array(sticky, dtype=bool)]
-    return int(max((np.argmax(column) for column in moved.T if column.any()), default=0))
 
 
 def _noise_of(

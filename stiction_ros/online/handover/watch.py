@@ -79,7 +79,6 @@ class Watch:
         self._since_move = 0
 
     def stop(self) -> None:
-        """Stop judging."""
         self.active = False
 
     def verdict(self) -> str:

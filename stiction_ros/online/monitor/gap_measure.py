@@ -8,7 +8,7 @@ import numpy as np
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
 from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
-from stiction_ros.effects.behaviour import BoolArray, FloatArray
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 from stiction_ros.signals.autoregression import whiten
@@ -94,7 +94,9 @@ def look_at(
     looks = []
     for i, base in enumerate(known):
         rows = run.blocks(i).scored  # held-out ones included
-        gap = _innovation_std(run, i, base.ar, rows)
+        basis = projector(whiten(run.free[i], base.ar)[rows])  # start and level are left open
+        left = left_by(basis, whiten(run.gap[:, i], base.ar)[rows])
+        gap = math.sqrt(float(left @ left) / max(len(left) - basis.shape[1], 1))
         freedom = base.freedom * int(rows.sum()) / max(base.rows, 1)
         limit, back = (
             math.sqrt(float(fisher.isf(level / len(known), freedom, base.freedom)))
@@ -119,10 +121,3 @@ def _output_baseline(run: FreeRun, output: int) -> OutputBaseline:
     return OutputBaseline(
         run.model.outputs[output], noise.ar, math.sqrt(variance), max(freedom, 2.0), int(rows.sum())
     )
-
-
-def _innovation_std(run: FreeRun, output: int, ar: FloatArray, rows: BoolArray) -> float:
-    """Return the standard deviation of the innovations with start and level left open."""
-    basis = projector(whiten(run.free[output], ar)[rows])
-    left = left_by(basis, whiten(run.gap[:, output], ar)[rows])
-    return math.sqrt(float(left @ left) / max(len(left) - basis.shape[1], 1))

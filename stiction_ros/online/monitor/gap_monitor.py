@@ -73,7 +73,6 @@ class GapLook:
 
     @property
     def text(self) -> str:
-        """One sentence."""
         worst = self.worst
         if worst is None:
             return self.failure
@@ -242,7 +241,10 @@ class GapMonitor:
         return found
 
     def _measured(self, sample: int, op: FloatArray, pv: FloatArray) -> GapLook | None:
-        self._take_model(sample)
+        while self._coming and self._coming[0][0] <= sample:
+            self.model = self._coming.pop(0)[1]
+            self._changed = None if self._reference is None else sample
+            self._forget()
         if not self.rule.monitor:
             return None
         if not self._window.add(op, pv) or (sample + 1) % self.rule.monitor_period:
@@ -257,12 +259,6 @@ class GapMonitor:
         except InputError as error:
             begin = sample + 1 - self.rule.monitor_window
             return GapLook(begin, sample, (), self._grown_since is not None, failure=str(error))
-
-    def _take_model(self, sample: int) -> None:
-        while self._coming and self._coming[0][0] <= sample:
-            self.model = self._coming.pop(0)[1]
-            self._changed = None if self._reference is None else sample
-            self._forget()
 
     def _last(self, count: int, sample: int) -> Record | None:
         """Return all samples that are kept; None when too few for ``count`` and their lead."""

@@ -29,7 +29,6 @@ class Comparison:
 
     @classmethod
     def whole(cls, recorded: Any, replayed: Any) -> "Comparison":
-        """Compare one thing."""
         difference = first_difference(recorded, replayed)
         return cls(1, int(not difference), difference)
 

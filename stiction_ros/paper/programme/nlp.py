@@ -12,11 +12,12 @@ The best objective of a stable process wins.
 """
 
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.identification_options import Progress
 from stiction_ros.paper import one_step_result as one_step
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme
@@ -37,7 +38,6 @@ AROUND = 0.05  # of f_max: points about an end, to choose the next start from
 NEARER = 0.3
 POINTS_AROUND = 200
 APART = 0.05  # of f_max: starts and ends nearer than that are one place
-Progress = Callable[[float], None]
 
 
 def search_at_its_best(

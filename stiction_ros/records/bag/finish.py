@@ -102,7 +102,6 @@ def metadata_record(scan: McapScan) -> dict[str, str]:
 
 
 def _copy(scan: McapScan, target: Writer) -> None:
-    """Copy all messages and topics."""
     schemas: dict[tuple[str, str, str], int] = {}
     channels: dict[BagTopic, int] = {}
     sequence: Counter[str] = Counter()

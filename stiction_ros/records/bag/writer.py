@@ -73,7 +73,6 @@ class Journal:
         self.path.unlink(missing_ok=True)
 
     def put(self, entry: McapRecord) -> None:
-        """Append a record."""
         builder = RecordBuilder()
         entry.write(builder)
         self.append(builder.end())  # type: ignore[no-untyped-call]

@@ -260,7 +260,6 @@ class BagLoops:
         return tuple(found)
 
     def parts(self, namespace: str | None) -> tuple[Record, ...]:
-        """Return the records of a loop."""
         return tuple(part for run in self.runs(namespace) for part in run.parts)
 
 

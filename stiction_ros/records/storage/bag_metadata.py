@@ -58,7 +58,6 @@ class BagTopic:
         return hash(self.name)  # looked up for every message; the definition is long
 
     def channel_metadata(self) -> dict[str, str]:
-        """Return the metadata of the topic's MCAP channel."""
         return {"offered_qos_profiles": self.qos_yaml, "topic_type_hash": self.type_hash}
 
 

@@ -63,7 +63,6 @@ class LocalEngine(Engine):
         return failed(task.loop, told, again=True)
 
     def close(self) -> None:
-        """End all workers."""
         while self._started:
             self._started.pop().close(at_once=True)
 
