@@ -39,7 +39,7 @@ class FoundEffect:
     def standing(self) -> Standing:
         """How far it is ahead, or one of those that are not told from it."""
         names = ((self.place, self.effect), *self.alternatives)
-        return self.stands or Standing(self.delta_bic, dict.fromkeys(names, self.delta_bic))
+        return self.stands or Standing(self.delta_bic, names)
 
     @property
     def effect(self) -> str:
@@ -116,10 +116,6 @@ def of_noise(laws: Sequence[NoiseEffect], declared: float, margin: float) -> Fou
         alternatives=tuple((each.place, each.behaviour.effect) for each in others),
         sentence="What no other effect explains wanders without a relation to OP, more than the "
         "noise that the model declares",
-        stands=Standing(
-            declared - best.score,
-            {(e.place, e.behaviour.effect): declared - e.score for e in (best, *others)},
-        ),
     )
 
 

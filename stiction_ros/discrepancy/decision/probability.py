@@ -1,16 +1,16 @@
-r"""The probability of an effect by the evidence that it is ahead, and the shares of a set in doubt.
+r"""The probability of an effect by the evidence that it is ahead; those of a set have equal shares.
 
-.. math:: \log \frac{P}{1 - P} = a + b \log(1 + e), \qquad P_i \propto \exp\frac{e_i}{2 T}
+.. math:: \log \frac{P}{1 - P} = a + b \log(1 + e)
 
-:math:`e` is the evidence by which the best of a set beats no effect and all rivals outside the set,
-:math:`e_i` that of one of the set. The figures stand in ``gap_probability.json``. ``stiction
-calibrate --gap`` of stiction-studies fits them to simulated loops whose effects are known.
+:math:`e` is the evidence by which the best of a set beats no effect and all rivals outside the set.
+The figures stand in ``gap_probability.json``. ``stiction calibrate --gap`` of stiction-studies fits
+them to simulated loops whose effects are known.
 """
 
 import functools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any, NamedTuple
 
@@ -25,23 +25,19 @@ class Coefficients(NamedTuple):
 
     constant: float  # log odds of what is not ahead at all
     slope: float  # of the log odds, by the logarithm of the evidence
-    temperature: float  # by which the evidence within a set counts less
 
 
 class Standing(NamedTuple):
     """What speaks for a set of effects, of which one acts; mostly it has one member."""
 
     ahead: float  # evidence, in BIC, over no effect and all rivals
-    evidences: Mapping[Any, float]  # of each member
+    names: Sequence[Any]
 
     def probabilities(self, by: Coefficients | None = None) -> dict[Any, float]:
         """Return the probability of each member, that of the set in sum."""
-        constant, slope, temperature = by or shipped()
+        constant, slope = by or shipped()
         odds = constant + slope * math.log1p(max(self.ahead, 0.0))
-        best = max(self.evidences.values())
-        own = {k: math.exp((e - best) / (2.0 * temperature)) for k, e in self.evidences.items()}
-        both = sum(own.values()) * (1.0 + math.exp(-odds))
-        return {name: weight / both for name, weight in own.items()}
+        return dict.fromkeys(self.names, 1.0 / (1.0 + math.exp(-odds)) / len(self.names))
 
 
 @functools.cache
@@ -54,17 +50,15 @@ def shipped() -> Coefficients:
 def standing(effect: AddedEffect, known: Sequence[AddedEffect]) -> Standing:
     """Return how far an effect, or one of those not told from it, is ahead of all rivals.
 
-    Neither what is in the model besides nor what contains one of the set is a rival. A member that
-    was not fitted has the evidence of the effect.
+    Neither what is in the model besides nor what contains one of the set is a rival.
     """
     own = effect.fit
-    given = dict.fromkeys((own.candidate.key, *effect.alternatives), -math.inf)
-    apart = given.keys() | {each.fit.candidate.key for each in known}
-    rivals = [0.0]
+    names = tuple(dict.fromkeys((own.candidate.key, *effect.alternatives)))
+    apart = {*names, *(each.fit.candidate.key for each in known)}
+    best, rivals = own.evidence, [0.0]
     for fit in effect.fits:
-        for name in given.keys() & fit.candidate.keys:
-            given[name] = max(given[name], fit.evidence)
+        if not {*names}.isdisjoint(fit.candidate.keys):
+            best = max(best, fit.evidence)
         if apart.isdisjoint((*fit.candidate.keys, *fit.candidate.contains)):
             rivals.append(fit.evidence)
-    given = {name: e if math.isfinite(e) else own.evidence for name, e in given.items()}
-    return Standing(max(given.values()) - max(rivals), given)
+    return Standing(best - max(rivals), names)

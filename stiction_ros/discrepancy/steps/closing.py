@@ -84,7 +84,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
         verdict = GapVerdict.UNKNOWN
     elif silent and state.now.changes:
         verdict = GapVerdict.NAMED
-    told = {name for each in effects for name in each.standing.evidences} | {*alternatives}
+    told = {name for each in effects for name in each.standing.names} | {*alternatives}
     task.report(1.0)
     return Discrepancy(
         verdict=verdict,

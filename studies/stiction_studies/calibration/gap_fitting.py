@@ -1,35 +1,28 @@
 """The probability of what ``gap`` names, fitted to answers about loops with something hidden."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
+from scipy.optimize import minimize
 
 from stiction_ros.discrepancy.decision.probability import Coefficients, Standing
 from stiction_ros.effects import FloatArray
 from stiction_studies.blind.scores.world_scores import WorldScore
 
-Claim = tuple[float, Sequence[tuple[float, bool]]]  # as of a score
+Claim = tuple[float, Sequence[bool]]  # as of a score
 
 
 def fitted(scores: Sequence[WorldScore]) -> Coefficients:
     """Return the figures under which what is true of all claims is likeliest."""
     claims = [claim for row in scores for claim in row.claims]
-    true = [claim for claim in claims if any(there for _, there in claim[1])]
     ahead = np.log1p([max(evidence, 0.0) for evidence, _ in claims])
-    side = np.array([1.0 if claim in true else -1.0 for claim in claims])
+    side = np.array([1.0 if any(there) else -1.0 for _, there in claims])
 
     def misses(x: FloatArray) -> float:
         return float(np.logaddexp(0.0, -side * (x[0] + x[1] * ahead)).sum())
 
-    def strayed(logarithm: float) -> float:
-        by = Coefficients(0.0, 0.0, math.exp(logarithm))  # a set has 1/2
-        return -sum(math.log(2.0 * float(told @ there)) for told, there in _told(true, by))
-
     constant, slope = minimize(misses, [0.0, 1.0], bounds=[(None, None), (0.0, None)]).x.tolist()
-    temperature = math.exp(minimize_scalar(strayed, bounds=(-2.0, 10.0), method="bounded").x)
-    return Coefficients(round(constant, 3), round(slope, 3), round(temperature, 2))
+    return Coefficients(round(constant, 3), round(slope, 3))
 
 
 def held(scores: Sequence[WorldScore], folds: int) -> tuple[FloatArray, FloatArray]:
@@ -49,8 +42,7 @@ def held(scores: Sequence[WorldScore], folds: int) -> tuple[FloatArray, FloatArr
 
 def _told(claims: Sequence[Claim], by: Coefficients) -> list[tuple[FloatArray, FloatArray]]:
     found = []
-    for ahead, members in claims:
-        evidences, there = zip(*members, strict=True)
-        told = Standing(ahead, dict(enumerate(evidences))).probabilities(by)
+    for ahead, there in claims:
+        told = Standing(ahead, range(len(there))).probabilities(by)
         found.append((np.array(list(told.values())), np.array(there, float)))
     return found

@@ -41,7 +41,7 @@ class WorldScore(Row):
     answer: Mapping[str, Any]  # what the workflow said, abridged
     # per effect or set: the evidence that it is ahead; of each member its evidence, and whether it
     # is there
-    claims: Sequence[tuple[float, Sequence[tuple[float, bool]]]] = ()
+    claims: Sequence[tuple[float, Sequence[bool]]] = ()
 
     @property
     def healthy(self) -> bool:
@@ -123,14 +123,14 @@ def score(
     )
 
 
-def claimed(loop: HiddenLoop, found: Discrepancy) -> list[tuple[float, list[tuple[float, bool]]]]:
+def claimed(loop: HiddenLoop, found: Discrepancy) -> list[tuple[float, list[bool]]]:
     """Return what is claimed, each member with the truth, as :attr:`WorldScore.claims` has it."""
     _, there, in_doubt = there_of(loop, found.to_dict())
     told = []
     for each in (*(effect.standing for effect in found.effects), found.in_doubt):
         if each is not None:
-            true = in_doubt if len(each.evidences) > 1 else there
-            told.append((each.ahead, [(e, name in true) for name, e in each.evidences.items()]))
+            true = in_doubt if len(each.names) > 1 else there
+            told.append((each.ahead, [name in true for name in each.names]))
     return told
 
 
