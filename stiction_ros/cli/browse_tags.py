@@ -30,6 +30,7 @@ def credentials_of(options: argparse.Namespace) -> Credentials:
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "browse-tags",
         description="Find everything that has a PV and an OP under one name, FIC101.PV or a "
@@ -49,6 +50,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     require_asyncua()
     check_address(options.url, "URL")
     if not options.sample_time > 0:

@@ -12,6 +12,7 @@ from stiction_ros.records.run.record_to_bag import write_bag
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "convert",
         description="Write a record in another form: OUT ending in .csv becomes a CSV file, "
@@ -28,6 +29,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     out = Path(options.out)
     to_csv = out.suffix.lower() == ".csv"
     if options.iso and not to_csv:

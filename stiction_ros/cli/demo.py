@@ -25,6 +25,7 @@ OPCUA_HELP = "; opcua: the tank behind a control system"
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     opcua, compare = extensions.part("demo opcua"), extensions.part("demo --compare")
     parser = commands.add_parser(
         "demo",
@@ -55,6 +56,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     compare = extensions.part("demo --compare")
     if compare is not None:
         if options.compare:

@@ -17,6 +17,7 @@ from stiction_ros.records.csv_writer import write_csv
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "fetch-history",
         description="Read the history of the loops of a tag map, page by page, and write one CSV "
@@ -41,6 +42,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     from stiction_ros.opcua.history import Span, fetch, modes_of, record_of
 
     require_asyncua()

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "fit-linear",
         description="Fit a linear model from OP to PV and write it as a loop model. Exit code 1 "
@@ -44,6 +45,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     loop = intake.opened(options)
     record = longest_part(loop.parts)
     from stiction_ros.identification.linear.data import LinearStatus, OrderCriterion

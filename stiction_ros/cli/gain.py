@@ -20,6 +20,7 @@ from stiction_ros.texts import probability
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "gain",
         description="Simulate what would help a loop: a serviced valve, a controller that knows "
@@ -43,6 +44,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     # Simulating takes compiled code, which other commands do not wait for.
     from stiction_ros.gain.gain import Gain
 

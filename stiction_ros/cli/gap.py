@@ -27,6 +27,7 @@ EXIT_CODES = {"named": 0, "none": 0, "ambiguous": 3, "unknown": 4, "untestable":
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "gap",
         description="Compare a loop model with records of its loop, name the physical effect that "
@@ -66,6 +67,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     options.inputs += [options.after] if options.after else []
     model, records = _inputs(options)
     from stiction_ros.discrepancy import GapOptions, find_discrepancy

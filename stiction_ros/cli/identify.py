@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "identify",
         description="Identify the friction of every valve and the process behind it from "
@@ -68,6 +69,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     loop = intake.opened(options)
     record, parts = longest_part(loop.parts), loop.parts
     chosen = searches.search_options(options)

@@ -15,6 +15,7 @@ from stiction_ros.records.csv_writer import write_csv
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "listen",
         description="Read pv and op_applied of every loop in the ROS graph and write one CSV "
@@ -36,6 +37,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     require_ros()
     for key in ("seconds", "sample_time", "window"):
         if not getattr(options, key) > 0:

@@ -16,6 +16,7 @@ _SAID = {
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "repair",
         description="Finish the files of a bag that its recorder did not close, save what is "
@@ -28,6 +29,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     try:
         done = repair_bag(options.bag)
     except OSError as error:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "replay",
         description="Run estimator and controller over a recorded bag without ROS, with the "
@@ -27,6 +28,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     storage_files(options.bag)  # a wrong path is told at once
     from stiction_ros.online.replays.result import Match
     from stiction_ros.online.replays.run import replay

@@ -11,6 +11,7 @@ from stiction_ros.records.parts import longest_part
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "report", description="Make a self-contained HTML report of a bag, or of a CSV record."
     )
@@ -34,6 +35,7 @@ def holds_live_run(path: str) -> bool:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     out = Path(options.out)
     with storing(out, fix="choose another --out"):
         if is_bag(options.record) and holds_live_run(options.record):

@@ -21,6 +21,7 @@ PRBS = "prbs"
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "simulate",
         description="Run a loop model in closed loop under the controller that it records "
@@ -52,6 +53,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     path = find_config(options.loop)
     model = LoopModel.load(path)
     schedule = None

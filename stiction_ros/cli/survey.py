@@ -85,6 +85,7 @@ def _table(entries: "Sequence[Entry]", width: int) -> Table:
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "survey",
         description="Judge every loop in files and folders of exports and list the valves to "
@@ -129,6 +130,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     # Judging takes compiled code, which other commands do not wait for.
     from stiction_ros.identification.friction import find_law
     from stiction_ros.identification.identification_options import IdentificationOptions

@@ -22,6 +22,7 @@ NEXT = "stiction valve-test judge TEST"
 
 
 def add(commands: Any) -> None:
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "valve-test",
         description="plan: from a record of the loop as it runs, the moves of OP in manual that "
@@ -40,6 +41,7 @@ def add(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run the command."""
     from stiction_ros.identification.valve_test.plan import first_round, further_round
 
     limits = _limits(options)
