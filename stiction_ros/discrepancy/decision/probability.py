@@ -1,4 +1,4 @@
-r"""The probability of an effect by the evidence that it is ahead; those of a set have equal shares.
+r"""The probability of an effect by the evidence that it is ahead, in equal shares within a set.
 
 .. math:: \log \frac{P}{1 - P} = a + b \log(1 + e)
 
@@ -31,7 +31,7 @@ class Standing(NamedTuple):
     """What speaks for a set of effects, of which one acts; mostly it has one member."""
 
     ahead: float  # evidence, in BIC, over no effect and all rivals
-    names: Sequence[Any]
+    names: Sequence[Any]  # of the set
 
     def probabilities(self, by: Coefficients | None = None) -> dict[Any, float]:
         """Return the probability of each member, that of the set in sum."""
@@ -53,12 +53,12 @@ def standing(effect: AddedEffect, known: Sequence[AddedEffect]) -> Standing:
     Neither what is in the model besides nor what contains one of the set is a rival.
     """
     own = effect.fit
-    names = tuple(dict.fromkeys((own.candidate.key, *effect.alternatives)))
-    apart = {*names, *(each.fit.candidate.key for each in known)}
+    names = dict.fromkeys((own.candidate.key, *effect.alternatives))
+    apart = names.keys() | {each.fit.candidate.key for each in known}
     best, rivals = own.evidence, [0.0]
     for fit in effect.fits:
-        if not {*names}.isdisjoint(fit.candidate.keys):
+        if not names.keys().isdisjoint(fit.candidate.keys):
             best = max(best, fit.evidence)
         if apart.isdisjoint((*fit.candidate.keys, *fit.candidate.contains)):
             rivals.append(fit.evidence)
-    return Standing(best - max(rivals), names)
+    return Standing(best - max(rivals), tuple(names))

@@ -111,7 +111,8 @@ def settled(
 ) -> FloatArray:
     """Return points with their linear figures at their best under given φ, shape (G, axes).
 
-    A figure of which the rows tell next to nothing stays near 0: its range is its deviation.
+    Each figure has a normal prior round 0, with the range of the figure as standard deviation. So a
+    figure stays near 0 where the rows say nothing about it.
     """
     moved = coordinates.copy()
     for d, axis in enumerate(candidate.axes):

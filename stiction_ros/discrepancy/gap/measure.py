@@ -36,7 +36,8 @@ def levelled(base: Baseline) -> Baseline:
     """Return the model with the level and the start that suit the free run best.
 
     The likelihood of noise with a long memory hardly sees them, and a free run with its figures may
-    stand anywhere. What leaves no trace in the rows that are fitted stays as it is.
+    stand anywhere. A column that is next to nothing in the fitted rows is left out, as its figure
+    could move the held-out rows by any amount.
 
     Args:
         base: the model.

@@ -28,7 +28,7 @@ def moves_on(model: LoopModel, output: int, valve: int) -> bool:
 
 
 def left_open(run: "FreeRun", output: int) -> list[FloatArray]:
-    """Return columns, shape (N, …), for what an output does between samples.
+    """Return blocks of columns, shape (N, q) each, for what an output does between samples.
 
     How late within a sample a stem moves is not known, nor how far a lag goes on.
     """
@@ -71,7 +71,7 @@ def beyond_samples(
     for rows in run.runs.slices:
         inputs, values = run.inputs(rows), run.forced[rows, output]
         if valve is not None:
-            inputs = _alone(inputs, valve)
+            inputs = _by_one_valve(inputs, valve)
             values = run.responses.forced(output, inputs)[:, 0]
         on_samples = Lag.simulate_grid(lags[:, None], values, float(values[0]), step)
         if plants:
@@ -94,8 +94,8 @@ def _behind(run: "FreeRun", output: int, own: ArxOutput) -> Responses:
     return responses_of(with_equation(run.model.process, output, own, step), step)
 
 
-def _alone(inputs: list[FloatArray], valve: int) -> list[FloatArray]:
-    """Return what enters the process, all but one valve at rest."""
+def _by_one_valve(inputs: list[FloatArray], valve: int) -> list[FloatArray]:
+    """Return the inputs of the process, with all valves at rest but the given one."""
     return [stem if j == valve else np.zeros_like(stem) for j, stem in enumerate(inputs)]
 
 
@@ -126,9 +126,9 @@ def not_yet_moved(run: "FreeRun", stems: FloatArray, rates: FloatArray | None = 
 
 
 def _a_sample_late(run: "FreeRun", output: int, valve: int) -> FloatArray:
-    """Return what an output lacks where a stem's moves come one sample late, or two, shape (N, 2).
+    """Return the error of an output whose stem moves one sample late, and two, shape (N, 2).
 
-    A stem of mass slides on over the next sample.
+    The stem has a mass, so that a move may go on in the next sample.
     """
     slews = [each.rate for each in run.model.valves[valve].effects if isinstance(each, Slew)]
     moves = not_yet_moved(run, run.stems[:, [valve]], np.array(slews[-1:]) if slews else None)
@@ -139,10 +139,10 @@ def _a_sample_late(run: "FreeRun", output: int, valve: int) -> FloatArray:
 
 
 def _half_a_sample_late(run: "FreeRun", output: int, valve: int) -> FloatArray:
-    """Return what an output lacks where a stem's moves come half a sample late, shape (N, ≤ 1).
+    """Return the error of an output whose stem moves half a sample late, shape (N, 1).
 
-    That is not half of what it lacks by a whole sample; nothing is told of it where the process is
-    no equation.
+    This error is not half of the error for a whole sample. Without an ARX equation the shape is
+    (N, 0).
     """
     equation = _equation(run, output)
     if equation is None:
@@ -150,7 +150,7 @@ def _half_a_sample_late(run: "FreeRun", output: int, valve: int) -> FloatArray:
     late = np.array([0.5 * (figure.what == DELAY) for figure in equation.figures])
     plant, parts = _behind(run, output, equation.changed(late)), []
     for rows in run.runs.slices:
-        inputs = _alone(run.inputs(rows), valve)
+        inputs = _by_one_valve(run.inputs(rows), valve)
         parts.append(plant.forced(output, inputs) - run.responses.forced(output, inputs))
     return end_to_end(parts)
 

@@ -91,7 +91,7 @@ def mended(task: Task, state: State) -> State | None:
     if found is None or found.worth(margin) >= state.now.worth(margin) - due:
         return None
     names = [each.effect for each in added] or _left_in_doubt(state)
-    beside = bool(found.effects) and not added  # which no look has judged yet
+    beside = bool(found.effects) and not added  # no look has judged a gain beside these effects
     if not beside and same_thing(found.changes, names):
         return None
     # Where no effect was in the model, the looks have to find it.

@@ -39,8 +39,7 @@ class WorldScore(Row):
     covered: Mapping[str, bool]  # per figure that was found, whether its interval holds the truth
     seconds: float  # processor time of the workflow
     answer: Mapping[str, Any]  # what the workflow said, abridged
-    # per effect or set: the evidence that it is ahead; of each member its evidence, and whether it
-    # is there
+    # per effect or set: the evidence that it is ahead; of each member, whether it is there
     claims: Sequence[tuple[float, Sequence[bool]]] = ()
 
     @property
