@@ -104,7 +104,17 @@ class ValveCandidate(KindCandidate):
         return Response(shifts or {0: np.zeros(stems.shape)})
 
 
-class StictionCandidate(ValveCandidate):
+class Sliding(ValveCandidate):
+    """A friction; its last figure, if asked, is how much of a sample late a stem moves."""
+
+    def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
+        stems = super().stems(run, points, from_measured=from_measured)
+        if not self.axes[-1].linear or not points[:, -1].any():
+            return stems
+        return stems - points[:, -1] * not_yet_moved(run, stems)
+
+
+class StictionCandidate(Sliding):
     """Stiction by f_S, f_D / f_S and the place of the stem in its band at the start."""
 
     def rows(self, points: FloatArray) -> FloatArray:
@@ -134,7 +144,8 @@ class StictionCandidate(ValveCandidate):
         totals = 2.0 * low * (high / low) ** cubes[:, 0]
         static = np.clip(0.5 * totals * (1.0 + cubes[:, 1]), low, high)
         ratios = (1.0 - cubes[:, 1]) / (1.0 + cubes[:, 1])
-        return np.column_stack([static, ratios, 2.0 * cubes[:, 2] - 1.0])
+        late = np.zeros((len(cubes), len(self.axes) - 3))
+        return np.column_stack([static, ratios, 2.0 * cubes[:, 2] - 1.0, late])
 
     def box(self, point: FloatArray, cubes: FloatArray, size: float) -> FloatArray:
         """Return points in a box around one, with any start of the stem.
@@ -151,7 +162,7 @@ class StictionCandidate(ValveCandidate):
 
     def cube(self, point: FloatArray) -> FloatArray:
         """Return what :meth:`of_cube` makes a point of, shape (axes,)."""
-        (static, ratio, lead), (low, high) = point, (self.axes[0].low, self.axes[0].high)
+        (static, ratio, lead), (low, high) = point[:3], (self.axes[0].low, self.axes[0].high)
         total = math.log(0.5 * static * (1.0 + ratio) / low, high / low)
         return np.asarray(
             np.clip([total, (1.0 - ratio) / (1.0 + ratio), 0.5 * (lead + 1.0)], 0.0, 1.0)
@@ -168,7 +179,7 @@ class OneFigure(ValveCandidate):
         return 1
 
 
-class BacklashCandidate(OneFigure):
+class BacklashCandidate(Sliding, OneFigure):
     """Backlash by its band and the place of the stem in it at the start."""
 
     def lead(self, point: FloatArray) -> float:
@@ -301,6 +312,7 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     start = Axis(-1.0, 1.0, 1)
     away = Axis(-2.0 * span, 2.0 * span, 1, linear=True)
     between = between_axes(any(run.runs.between[j : j + 1]))
+    late = (Axis(-1.0, 1.0, 1, linear=True),) if between else ()
 
     def sizes(least: float, most: float, count: int) -> Axis:
         return Axis(least, most, count, logarithmic=True)
@@ -315,9 +327,9 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     bends = Axis(-40.0, 40.0, 17), Axis(-30.0, 30.0, 1, linear=True)
     limits = tuple(run.model.limits[j].tolist())
     return [
-        StictionCandidate.at(run, j, HeStiction, fine, needle=True),
-        StictionCandidate.at(run, j, XchStiction, rough),
-        BacklashCandidate.at(run, j, Backlash, bands),
+        StictionCandidate.at(run, j, HeStiction, (*fine, *late), needle=True),
+        StictionCandidate.at(run, j, XchStiction, (*rough, *late)),
+        BacklashCandidate.at(run, j, Backlash, (*bands, *late)),
         SlewCandidate.at(run, j, Slew, (*rates, *between), reach=span),
         LagCandidate.at(run, j, Lag, (lag_axis(run), away, *between)),
         SaturationCandidate.at(run, j, Saturation, ends, limits=limits),

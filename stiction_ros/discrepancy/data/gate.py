@@ -277,16 +277,23 @@ def _surprise(runs: Runs, output: int) -> float:
 
 
 def _alone(values: FloatArray) -> BoolArray:
-    """Return samples far off both neighbours, which are near each other: up to three in a row."""
+    """Return samples far off the straight line between their neighbours: up to three in a row.
+
+    The values before and behind must go on along this line, as at no step and no bend.
+    """
     found, scale = np.zeros(len(values), dtype=bool), TRACE * float(np.ptp(values))
+    slopes = np.diff(np.pad(values, 1, mode="edge"))
     for count in range(1, min(TRIED, len(values) - 1)):
-        first, last = values[: -count - 1], values[count + 1 :]
-        inside = np.stack([values[k : k + len(first)] for k in range(1, count + 1)])
-        away, apart = np.abs(inside - 0.5 * (first + last)).min(axis=0), np.abs(last - first)
+        size = len(values) - count - 1
+        first, last = values[:size], values[-size:]
+        rise = (last - first) / (count + 1)
+        inside = [values[k : k + size] - first - k * rise for k in range(1, count + 1)]
+        away = np.abs(inside).min(axis=0)
+        bends = np.abs([rise - slopes[:size], rise - slopes[-size:]]).max(axis=0)
         scale = max(float(np.median(away)), scale)
-        far = (away > OUTLYING * scale) & (apart < 0.5 * away)
+        far = (away > OUTLYING * scale) & ((count + 1) * bends < 0.5 * away)
         for k in range(1, count + 1):
-            found[k : k + len(far)] |= far
+            found[k : k + size] |= far
     return found
 
 

@@ -250,7 +250,7 @@ def not_contradicted(run: FreeRun, fits: Sequence[CandidateFit]) -> list[Candida
 
 
 def confirmed_by_stem(run: FreeRun, fit: CandidateFit) -> bool:
-    """Tell whether every record has a stem, and most of its distance from OP is that effect.
+    """Tell whether stems are recorded, and most of their distance from OP is that effect.
 
     A stem that is merely late, or smoother than OP, comes a little nearer by any bend.
     """

@@ -217,7 +217,7 @@ class _Search:
         """
         from scipy.optimize import differential_evolution
 
-        halton = halton_sequence(len(self.candidate.axes), seed=0)
+        halton = halton_sequence(3, seed=0)
         white = dict.fromkeys(range(len(self.base.noise)), NO_MEMORY)
         for under in (white, None):  # None: under the noise of the best fit so far
             leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:TRIED]
@@ -225,7 +225,7 @@ class _Search:
             first[: len(leading)] = [self.needle.cube(fit.point) for fit in leading]
             found = differential_evolution(
                 self._loss,
-                [(0.0, 1.0)] * len(self.candidate.axes),
+                [(0.0, 1.0)] * 3,
                 args=(under or self._searched(self.found),),
                 strategy="rand1bin",
                 init=first,

@@ -97,8 +97,8 @@ class Runs:
 
     @property
     def stems_recorded(self) -> bool:
-        """Whether every record has the positions of its stems."""
-        return all(record.stem is not None for record in self.records)
+        """Whether a record has the positions of its stems."""
+        return any(record.stem is not None for record in self.records)
 
     def stem(self, valve: str) -> FloatArray:
         """Return the recorded positions of a stem, shape (N,), %; NaN in records without."""
