@@ -4,11 +4,10 @@ import numpy as np
 from scipy.linalg import qr
 
 from stiction_ros.compiled import compiled
-from stiction_ros.discrepancy.measures import EPSILON, ROUNDING
+from stiction_ros.discrepancy.measures import MAJORITY, ROUNDING
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.signals.autoregression import TINY, inner_product, whitened_rows
 
-APART = EPSILON**0.25  # of a scaled column, beside others: normal equations keep half of all digits
 NOTHING = TINY**0.5  # length of a column that is zero on the fitted rows
 
 
@@ -49,52 +48,39 @@ def whitened_columns(columns: FloatArray, ar: FloatArray, rows: BoolArray) -> Fl
     return np.asarray(block.T)
 
 
-def coefficients(columns: FloatArray, target: FloatArray) -> FloatArray:
-    """Return those of least squares; of columns that depend on each other, the smallest ones.
-
-    Args:
-        columns: shape (q, n).
-        target: shape (n,).
-    """
-    apart, beta = _normal_equations(columns, target)
-    if apart or not len(columns):
-        return np.asarray(beta)
-    scale = _lengths(columns.T)
-    return np.asarray(np.linalg.lstsq(columns.T / scale, target, rcond=ROUNDING)[0] / scale)
-
-
 @compiled
-def _normal_equations(columns: FloatArray, target: FloatArray) -> tuple[bool, FloatArray]:
-    """Return whether the columns are far from dependent, and the coefficients of least squares.
+def coefficients(columns: FloatArray, target: FloatArray) -> FloatArray:
+    """Return those of least squares, 0 of a column that depends on those before it.
+
+    Gram-Schmidt; a column that loses most of its length is made orthogonal twice.
 
     Args:
         columns: shape (q, n).
         target: shape (n,).
     """
     count = len(columns)
-    factor, beta, scale = np.empty((count, count)), np.zeros(count), np.empty(count)
+    basis, factor, beta = columns.copy(), np.zeros((count, count)), np.zeros(count)
     for i in range(count):
-        scale[i] = np.sqrt(inner_product(columns[i], columns[i]))
-        if not scale[i] > NOTHING:
-            return False, beta
-        for j in range(i + 1):
-            value = inner_product(columns[i], columns[j]) / (scale[i] * scale[j])
-            for k in range(j):
-                value -= factor[i, k] * factor[j, k]
-            factor[i, j] = value / factor[j, j] if j < i else np.sqrt(max(value, 0.0))
-        if not factor[i, i] > APART:
-            return False, beta
-        value = inner_product(columns[i], target) / scale[i]
-        for k in range(i):
+        whole = left = np.sqrt(inner_product(basis[i], basis[i]))
+        before = np.inf
+        while left < MAJORITY * before and left > ROUNDING * whole:
+            before = left
+            for j in range(i):
+                share = inner_product(basis[j], basis[i])
+                factor[j, i] += share
+                for n in range(len(target)):
+                    basis[i, n] -= share * basis[j, n]
+            left = np.sqrt(inner_product(basis[i], basis[i]))
+        kept = left > max(ROUNDING * whole, NOTHING)
+        factor[i, i] = left if kept else np.inf
+        for n in range(len(target)):
+            basis[i, n] = basis[i, n] / left if kept else 0.0
+    for i in range(count - 1, -1, -1):
+        value = inner_product(basis[i], target)
+        for k in range(i + 1, count):
             value -= factor[i, k] * beta[k]
         beta[i] = value / factor[i, i]
-    for i in range(count - 1, -1, -1):
-        for k in range(i + 1, count):
-            beta[i] -= factor[k, i] * beta[k]
-        beta[i] /= factor[i, i]
-    for i in range(count):
-        beta[i] /= scale[i]
-    return True, beta
+    return beta
 
 
 def projector(columns: FloatArray) -> FloatArray:
