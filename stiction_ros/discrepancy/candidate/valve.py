@@ -317,19 +317,17 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     def sizes(least: float, most: float, count: int) -> Axis:
         return Axis(least, most, count, logarithmic=True)
 
-    # He's slips depend on f_S and f_D to the last digits: its optimum is a needle.
     largest = (1.0 - SLIGHT) * span  # what never moves the stem cannot be told
-    fine = sizes(0.01 * span, largest, 160), Axis(0.0, 1.0, 17, natural=True), start
-    rough = sizes(0.01 * span, largest, 50), Axis(0.0, 1.0, 9, natural=True), start
-    bands = sizes(0.02 * span, 1.8 * span, 24), start
+    figures = sizes(0.01 * span, largest, 50), Axis(0.0, 1.0, 9, natural=True), start, *late
+    bands = sizes(0.02 * span, 1.8 * span, 24), start, *late
     rates = sizes(0.003 * fastest, 0.95 * fastest, 24), start
     ends = Axis(low, lower, 14, natural=True), Axis(upper, high, 14, natural=True)
     bends = Axis(-40.0, 40.0, 17), Axis(-30.0, 30.0, 1, linear=True)
     limits = tuple(run.model.limits[j].tolist())
     return [
-        StictionCandidate.at(run, j, HeStiction, (*fine, *late), needle=True),
-        StictionCandidate.at(run, j, XchStiction, (*rough, *late)),
-        BacklashCandidate.at(run, j, Backlash, (*bands, *late)),
+        StictionCandidate.at(run, j, HeStiction, figures, needle=True),
+        StictionCandidate.at(run, j, XchStiction, figures),
+        BacklashCandidate.at(run, j, Backlash, bands),
         SlewCandidate.at(run, j, Slew, (*rates, *between), reach=span),
         LagCandidate.at(run, j, Lag, (lag_axis(run), away, *between)),
         SaturationCandidate.at(run, j, Saturation, ends, limits=limits),

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_ros.discrepancy.measures import ALONG, EPSILON, NEGLIGIBLE, ROUNDING
+from stiction_ros.discrepancy.measures import ALL_AROUND, EPSILON, NEGLIGIBLE, ROUNDING
 from stiction_ros.effects import FloatArray
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, Process
 from stiction_ros.processes.sampled import pulses
@@ -53,12 +53,12 @@ def held(denominator: tuple[float, ...], b: tuple[float, ...]) -> Held | None:
     wanted = np.array([*b, *[0.0] * (count + 1 - len(b))])
 
     def left(fraction: float) -> float:
-        return _solved(poles, fraction, wanted)[1]
+        return _solved(poles, fraction, wanted)[1] ** 2  # near its least value a parabola
 
     if len(b) <= count:
         fraction = 0.0
     else:
-        grid = np.linspace(0.0, 1.0, ALONG)
+        grid = np.linspace(0.0, 1.0, ALL_AROUND)
         tried = [left(float(each)) for each in grid]
         best, width = float(grid[int(np.argmin(tried))]), float(grid[1])
         inside = (max(best - width, 0.0), min(best + width, 1.0))
