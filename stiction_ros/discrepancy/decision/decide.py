@@ -262,7 +262,7 @@ def told_by_stem(run: FreeRun, decision: Decision, fits: Sequence[CandidateFit])
 
     A lag is of the valve where its stem comes as late, and of nothing behind the valve; where the
     stem does not, it is none of the valve's. So with all other effects of a valve that are left in
-    doubt with what lies behind it.
+    doubt with what lies behind it, or with each other: the nearest stem is most of twice as near.
     """
     chosen = decision.chosen
     if chosen is None or not decision.alternatives or not run.runs.stems_recorded:
@@ -270,8 +270,9 @@ def told_by_stem(run: FreeRun, decision: Decision, fits: Sequence[CandidateFit])
     names = {chosen.candidate.key, *decision.alternatives}
     at_valve = {name for name in names if name[0].startswith("valve:")}
     by_name = {fit.candidate.key: fit for fit in sorted(fits, key=lambda fit: fit.evidence)}
-    borne = {name for name in at_valve if name in by_name and confirmed_by_stem(run, by_name[name])}
-    kept = borne or names - at_valve
+    left = {name: left_of_stem(run, by_name[name]) for name in at_valve if name in by_name}
+    bound = min(MAJORITY, min(left.values(), default=1.0) / MAJORITY)
+    kept = {name for name in left if left[name] < bound} or names - at_valve
     if not kept:
         return decision
     able = [by_name[name] for name in kept if name in by_name]
