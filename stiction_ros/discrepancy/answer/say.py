@@ -78,11 +78,12 @@ def experiment_for(
         return "record the stem position and a second sensor, and move the set-point in steps"
     if not alternatives:
         return ""
-    names = {effect for _, effect in alternatives}
-    names |= {effect.effect for effect in effects if effect.alternatives}
-    told = (about(name).separation for name in sorted(names))
+    keys = {*alternatives, *((each.place, each.effect) for each in effects if each.alternatives)}
+    told = [about(name).separation for name in sorted({effect for _, effect in keys})]
+    if {"load", "disturbance"} <= {place.partition(":")[0] for place, _ in keys}:
+        told.append("measure the flow behind the valve: a load shows there")
     hints = dict.fromkeys(text for text in told if text)
-    return "; ".join(hints) or "move the set-point in larger steps and record the stem position"
+    return "; ".join(hints) or "take a longer record"
 
 
 def reason_for(effect: AddedEffect, looks: Sequence[Look]) -> str:

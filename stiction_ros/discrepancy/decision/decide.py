@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
+from stiction_ros.discrepancy.candidate.wave import LOAD, StepCandidate
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.measures import MAJORITY, MARGIN, OFTEN, SLIGHT, SURE
 from stiction_ros.discrepancy.simulation.free_run import HELD_SHARE, FreeRun
@@ -231,22 +232,32 @@ def friction_kind(
 def left_of_stem(run: FreeRun, fit: CandidateFit) -> float:
     """Return the share of a stem's squared distance from the measured one that a fit leaves.
 
-    1 of what is no effect of a valve, and where no stem is recorded.
+    1 of what is no effect of a valve, and where no stem is recorded. The step of a load is taken
+    as that of a stem, its twin.
     """
-    candidate = fit.candidate
-    if not isinstance(candidate, ValveCandidate):
+    candidate, point = fit.candidate, fit.point[None, :]
+    if isinstance(candidate, ValveCandidate):
+        valve = candidate.valve
+        stems = candidate.stems(run, point, from_measured=True)[:, 0]
+    elif isinstance(candidate, StepCandidate) and candidate.place.startswith(LOAD):
+        valve = candidate.index
+        stems = run.stems[:, valve] + candidate.columns(run, point)[:, 0] @ fit.factors
+    else:
         return 1.0
-    measured = run.runs.stem(run.model.valve_names[candidate.valve])
-    stems = candidate.stems(run, fit.point[None, :], from_measured=True)[:, 0]
+    measured = run.runs.stem(run.model.valve_names[valve])
     before, after = (
-        float(np.nansum((each - measured) ** 2)) for each in (run.stems[:, candidate.valve], stems)
+        float(np.nansum((each - measured) ** 2)) for each in (run.stems[:, valve], stems)
     )
     return after / before if before > 0.0 else 1.0 + after
 
 
 def not_contradicted(run: FreeRun, fits: Sequence[CandidateFit]) -> list[CandidateFit]:
     """Return the fits but for those whose stem is further from the measured one than now."""
-    return [fit for fit in fits if left_of_stem(run, fit) <= 1.0]
+    return [
+        fit
+        for fit in fits
+        if not isinstance(fit.candidate, ValveCandidate) or left_of_stem(run, fit) <= 1.0
+    ]
 
 
 def confirmed_by_stem(run: FreeRun, fit: CandidateFit) -> bool:
@@ -269,10 +280,11 @@ def told_by_stem(run: FreeRun, decision: Decision, fits: Sequence[CandidateFit])
         return decision
     names = {chosen.candidate.key, *decision.alternatives}
     at_valve = {name for name in names if name[0].startswith("valve:")}
-    by_name = {fit.candidate.key: fit for fit in sorted(fits, key=lambda fit: fit.evidence)}
+    ranked = sorted(fits, key=lambda fit: fit.evidence)
+    by_name = {key: fit for fit in ranked for key in reversed(fit.candidate.keys)}
     left = {name: left_of_stem(run, by_name[name]) for name in at_valve if name in by_name}
     bound = min(MAJORITY, min(left.values(), default=1.0) / MAJORITY)
-    kept = {name for name in left if left[name] < bound} or names - at_valve
+    kept = {name for name in left if left[name] <= bound} or names - at_valve
     if not kept:
         return decision
     able = [by_name[name] for name in kept if name in by_name]
