@@ -279,7 +279,7 @@ def _surprise(runs: Runs, output: int) -> float:
 def _alone(values: FloatArray) -> BoolArray:
     """Return samples far off the straight line between their neighbours: up to three in a row.
 
-    The values before and behind must go on along this line, as at no step and no bend.
+    The values before and after them must lie on the same line: at a step or a bend they do not.
     """
     found, scale = np.zeros(len(values), dtype=bool), TRACE * float(np.ptp(values))
     slopes = np.diff(np.pad(values, 1, mode="edge"))

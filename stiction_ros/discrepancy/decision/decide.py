@@ -220,10 +220,9 @@ def friction_kind(
     if best.evidence < MARGIN + SURE:  # too little to tell whether there is a jump
         other = jumping[0] if best.candidate.effect == Backlash.effect else plain[0]
         return best, (other.candidate.key,)
-    if jump > MARGIN and jumping[0].candidate.leaps(jumping[0].point):
+    if jump > MARGIN:
         return jumping[0], ()
-    absent = jump < -JUMP_ABSENT and not jumping[0].candidate.leaps(jumping[0].point)
-    if absent and departures(plain[0]) >= OFTEN:
+    if jump < -JUMP_ABSENT and departures(plain[0]) >= OFTEN:
         return plain[0], ()
     first, second = (jumping[0], plain[0]) if jump > 0.0 else (plain[0], jumping[0])
     return first, (second.candidate.key,)

@@ -19,14 +19,7 @@ from stiction_ros.discrepancy.likelihood.noise import (
     noise_forms,
     shared_factors,
 )
-from stiction_ros.discrepancy.measures import (
-    FINE_ROUNDS,
-    ROUNDS,
-    SETTLED,
-    SIDES,
-    SURE,
-    TRIED,
-)
+from stiction_ros.discrepancy.measures import FINE_ROUNDS, ROUNDS, SETTLED, SIDES, SURE, TRIED
 from stiction_ros.effects import Behaviour, FloatArray
 
 SLOW = np.array([0.8])
