@@ -137,6 +137,10 @@ class Candidate(ABC):
         """Return how far from OP a stem stands before the first sample, %."""
         return 0.0
 
+    def leaps(self, point: FloatArray) -> bool:
+        """Tell whether a stem that leaves its rest jumps by a size that matters."""
+        return True
+
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
         """Tell whether its figures are of engineering size.
 

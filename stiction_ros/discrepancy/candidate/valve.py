@@ -130,6 +130,10 @@ class StictionCandidate(Sliding):
     def stepped(self) -> bool:
         return True
 
+    def leaps(self, point: FloatArray) -> bool:
+        # A smaller one may be what the stem moves between two samples.
+        return float(1.0 - point[1]) >= SLIGHT * float(1.0 + point[1])
+
     def of_cube(self, cubes: FloatArray) -> FloatArray:
         """Return points for shares, shape (G, axes), of all sums, jumps and starts.
 

@@ -220,7 +220,7 @@ def friction_kind(
     if best.evidence < MARGIN + SURE:  # too little to tell whether there is a jump
         other = jumping[0] if best.candidate.effect == Backlash.effect else plain[0]
         return best, (other.candidate.key,)
-    if jump > MARGIN:
+    if jump > MARGIN and jumping[0].candidate.leaps(jumping[0].point):
         return jumping[0], ()
     if jump < -JUMP_ABSENT and departures(plain[0]) >= OFTEN:
         return plain[0], ()
