@@ -82,8 +82,7 @@ def experiment_for(
     told = [about(name).separation for name in sorted({effect for _, effect in keys})]
     if {"load", "disturbance"} <= {place.partition(":")[0] for place, _ in keys}:
         told.append("measure the flow behind the valve: a load shows there")
-    hints = dict.fromkeys(text for text in told if text)
-    return "; ".join(hints) or "take a longer record"
+    return "; ".join(dict.fromkeys(filter(None, told))) or "take a longer record"
 
 
 def reason_for(effect: AddedEffect, looks: Sequence[Look]) -> str:

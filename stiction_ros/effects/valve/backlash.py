@@ -23,8 +23,8 @@ class Backlash(Behaviour):
     places: ClassVar[tuple[str, ...]] = ("valve",)
     experiment: ClassVar[str] = "let OP reverse by more than the play that matters"
     separation: ClassVar[str] = (
-        "ramp OP slowly through a reversal and back: a stem that jumps after its rest has "
-        "stiction, one that follows smoothly has backlash"
+        "ramp OP slowly through a reversal and back, and record the stem: after its rest it jumps "
+        "with stiction and follows smoothly with backlash"
     )
     family: ClassVar[str] = "friction"
     least: ClassVar[float] = 0.1  # %

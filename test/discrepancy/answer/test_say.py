@@ -6,8 +6,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from stiction_ros.discrepancy.answer.say import reason_for
+from stiction_ros.discrepancy.answer.say import experiment_for, reason_for
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
+from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Behaviour, FloatArray
@@ -56,3 +57,22 @@ def test_a_rival_is_the_next_best_or_gained_more_before(rival: float, said: str)
     own, other = fit("slew", 80.0), fit("lag", rival)
     added = cast("Any", SimpleNamespace(fit=own, alternatives=()))
     assert reason_for(added, [look(own, other)]) == said
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ([("disturbance:PV1", "step"), ("sensor:PV1", "bias_step")], "second sensor"),
+        ([("load:V1", "step"), ("valve:V1", "offset")], "record the stem position"),
+        ([("disturbance:PV1", "sine"), ("load:V1", "sine")], "measure the flow behind the valve"),
+        ([("disturbance:PV1", "coloured"), ("disturbance:PV1", "random_walk")], "longer record"),
+    ],
+)
+def test_the_experiment_is_one_that_tells_the_set_apart(
+    names: list[tuple[str, str]], said: str
+) -> None:
+    first, *others = names
+    found = SimpleNamespace(place=first[0], effect=first[1], alternatives=tuple(others))
+    text = experiment_for(GapVerdict.AMBIGUOUS, [cast("Any", found)], others, [])
+    assert said in text
+    assert ";" not in text
