@@ -259,14 +259,6 @@ def not_contradicted(run: FreeRun, fits: Sequence[CandidateFit]) -> list[Candida
     ]
 
 
-def confirmed_by_stem(run: FreeRun, fit: CandidateFit) -> bool:
-    """Tell whether stems are recorded, and most of their distance from OP is that effect.
-
-    A stem that is merely late, or smoother than OP, comes a little nearer by any bend.
-    """
-    return run.runs.stems_recorded and left_of_stem(run, fit) < MAJORITY
-
-
 def told_by_stem(run: FreeRun, decision: Decision, fits: Sequence[CandidateFit]) -> Decision:
     """Return what holds of a decision where recorded stems take part in it.
 
@@ -284,12 +276,10 @@ def told_by_stem(run: FreeRun, decision: Decision, fits: Sequence[CandidateFit])
     left = {name: left_of_stem(run, by_name[name]) for name in at_valve if name in by_name}
     bound = min(MAJORITY, min(left.values(), default=1.0) / MAJORITY)
     kept = {name for name in left if left[name] <= bound} or names - at_valve
-    if not kept:
-        return decision
     able = [by_name[name] for name in kept if name in by_name]
-    first = max(able, key=lambda fit: fit.evidence, default=None)
-    if first is None:
+    if not able:
         return decision
+    first = max(able, key=lambda fit: fit.evidence)
     others = tuple(n for n in decision.alternatives if n in kept and n != first.candidate.key)
     if chosen.candidate.key in kept and chosen is not first:
         others = (*others, chosen.candidate.key)

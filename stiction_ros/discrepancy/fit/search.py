@@ -24,11 +24,10 @@ from stiction_ros.effects import Behaviour, FloatArray
 
 SLOW = np.array([0.8])
 SHRINK = 0.4
-FIGURES = 3  # of a needle: f_S, f_D and the start
 BRED = 100  # points of a needle that breed together
 GENERATIONS = 160  # how often: few points that breed long find what many lose
 BOXES = tuple(0.6**k for k in range(FINE_ROUNDS))  # around the best point, of the largest
-THROWN = 1500  # points in a box
+THROWN = 15 * BRED  # points in a box
 FAIR = 3  # rounds after which a start that is surely behind is given up
 NO_MEMORY = np.zeros(0)
 
@@ -195,12 +194,6 @@ class _Search:
         found = self._try(best[0] + offsets * (size * steps), best[1], under)
         return found if under is not None or found[1].delta_bic >= best[1].delta_bic else best
 
-    @property
-    def needle(self) -> StictionCandidate:
-        """The candidate, whose optimum is narrower than any lattice is fine."""
-        assert isinstance(self.candidate, StictionCandidate)
-        return self.candidate
-
     def breed(self) -> None:
         """Search all figures of a needle by differential evolution, then in ever smaller boxes.
 
@@ -209,32 +202,35 @@ class _Search:
         it nothing leads there. The boxes are around the best point so far; the start of a stem is
         left open in all of them: one that is wrong hides the rest.
         """
-        halton, random = halton_sequence(FIGURES, seed=0), np.random.default_rng(0)
+        needle, run = self.candidate, self.base.run
+        assert isinstance(needle, StictionCandidate)
+
+        def losses_of(cubes: FloatArray) -> FloatArray:
+            response = needle.respond(run, needle.of_cube(cubes))
+            return misfit(self.base, self.gap, response, ar)
+
+        random = np.random.default_rng(0)
+        halton = halton_sequence(len(needle.cube(self.best().point)), seed=0)
         white = dict.fromkeys(range(len(self.base.noise)), NO_MEMORY)
         for under in (white, None):  # None: under the noise of the best fit so far
             leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:TRIED]
             cubes = halton.random(BRED)
-            cubes[: len(leading)] = [self.needle.cube(fit.point) for fit in leading]
+            cubes[: len(leading)] = [needle.cube(fit.point) for fit in leading]
             ar = under or self._searched(self.found)
-            losses = self._loss(cubes, ar)
+            losses = losses_of(cubes)
             for _ in range(GENERATIONS):
                 tried = _bred(cubes, random)
-                found = self._loss(tried, ar)
+                found = losses_of(tried)
                 better = found <= losses
                 cubes[better], losses[better] = tried[better], found[better]
-            best = self.needle.of_cube(cubes[[int(np.argmin(losses))]])
-            self.judge(best[0], self.candidate.respond(self.base.run, best))
+            best = needle.of_cube(cubes[[int(np.argmin(losses))]])
+            self.judge(best[0], needle.respond(run, best))
         for size in BOXES:
             fit = self.best()
-            values = self.needle.box(fit.point, halton.random(THROWN), size)
-            response = self.candidate.respond(self.base.run, values)
+            values = needle.box(fit.point, halton.random(THROWN), size)
+            response = needle.respond(run, values)
             self.best_of(values, response, [fit.noise, self.base.noise])
             self._judge_best(values, response, dict.fromkeys(response.outputs, NO_MEMORY))
-
-    def _loss(self, cubes: FloatArray, under: Under) -> FloatArray:
-        """Return the misfit of points of the cube of all figures, shape (G, 3), under φ."""
-        values = self.needle.of_cube(cubes)
-        return misfit(self.base, self.gap, self.candidate.respond(self.base.run, values), under)
 
     def _searched(self, like: CandidateFit | None) -> dict[int, FloatArray]:
         """Return φ under which points are compared: of a fit, where it has any."""

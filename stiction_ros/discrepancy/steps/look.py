@@ -12,8 +12,8 @@ from stiction_ros.discrepancy.decision.decide import (
     Decision,
     GapVerdict,
     borne_out,
-    confirmed_by_stem,
     decide,
+    left_of_stem,
     not_contradicted,
     told_by_stem,
 )
@@ -27,7 +27,7 @@ from stiction_ros.discrepancy.decision.scores import Scores, all_candidates, sco
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.gap.where import locate
-from stiction_ros.discrepancy.measures import TURNS
+from stiction_ros.discrepancy.measures import MAJORITY, TURNS
 from stiction_ros.discrepancy.process.change import open_figures, refitted_process
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import changed_again, process_first
@@ -175,7 +175,7 @@ def _in_doubt_of_place(base: Baseline, decision: Decision) -> Decision:
     """
     if decision.chosen is None or not decision.chosen.candidate.about.bends:
         return decision
-    if confirmed_by_stem(base.run, decision.chosen):
+    if left_of_stem(base.run, decision.chosen) < MAJORITY:
         return decision
     _, _, valve = decision.chosen.candidate.place.partition(":")
     names = base.run.model.outputs
