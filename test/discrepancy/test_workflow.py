@@ -11,6 +11,7 @@ from stiction_ros.effects import (
     ExtraDelay,
     ExtraPole,
     HeStiction,
+    Lag,
     ProcessGain,
     StepDisturbance,
 )
@@ -93,6 +94,23 @@ def test_a_measured_stem_speaks_against_a_slow_valve() -> None:
     answer = find_discrepancy(loop(), [recorded], QUICK)
     names = {(e.place, e.effect) for e in answer.effects} | set(answer.alternatives)
     assert names == {("process:PV1", "pole"), ("sensor:PV1", "lag")}
+
+
+@pytest.mark.trial
+@pytest.mark.parametrize(
+    ("place", "effect", "left"),
+    [
+        ("valve:V1", Lag(8.0), {("valve:V1", "lag")}),
+        ("process:PV1", ExtraPole(8.0), {("process:PV1", "pole"), ("sensor:PV1", "lag")}),
+    ],
+)
+def test_a_stem_recorded_later_tells_where_the_lag_is(
+    place: str, effect: Behaviour, left: set[tuple[str, str]]
+) -> None:
+    slow = loop().with_effect(place, effect)
+    answer = find_discrepancy(loop(), [record(slow), record(slow, 2, stem=True)], QUICK)
+    names = {(e.place, e.effect) for e in answer.effects} | set(answer.alternatives)
+    assert names == left
 
 
 @pytest.mark.trial
