@@ -113,6 +113,9 @@ class Sliding(ValveCandidate):
             return stems
         return stems - points[:, -1] * not_yet_moved(run, stems)
 
+    def count(self, point: FloatArray) -> int:
+        return len(point) - 1
+
 
 class StictionCandidate(Sliding):
     """Stiction by f_S, f_D / f_S and the place of the stem in its band at the start."""
@@ -122,9 +125,6 @@ class StictionCandidate(Sliding):
 
     def lead(self, point: FloatArray) -> float:
         return SHORT_OF_A_SLIP * float(point[0] * point[2])
-
-    def count(self, point: FloatArray) -> int:
-        return 2
 
     @property
     def stepped(self) -> bool:
