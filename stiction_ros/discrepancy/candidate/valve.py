@@ -105,7 +105,7 @@ class ValveCandidate(KindCandidate):
 
 
 class Sliding(ValveCandidate):
-    """A friction; its last figure, if asked, is how much of a sample late a stem moves."""
+    """A friction. Its last figure, if asked, is by how many samples the stem moves late."""
 
     def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
         stems = super().stems(run, points, from_measured=from_measured)
@@ -135,7 +135,7 @@ class StictionCandidate(Sliding):
         return float(1.0 - point[1]) >= SLIGHT * float(1.0 + point[1])
 
     def of_cube(self, cubes: FloatArray) -> FloatArray:
-        """Return points for shares, shape (G, axes), of all sums, jumps and starts.
+        """Return points, shape (G, axes), for shares, (G, 3), of all sums, jumps and starts.
 
         The sum of the frictions, how far OP goes back before the stem follows, is told well by any
         record; their difference, the jump, much less.
@@ -161,7 +161,7 @@ class StictionCandidate(Sliding):
         return self.of_cube(np.column_stack([near, cubes[:, 2]]))
 
     def cube(self, point: FloatArray) -> FloatArray:
-        """Return what :meth:`of_cube` makes a point of, shape (axes,)."""
+        """Return the shares that :meth:`of_cube` makes a point of, shape (3,)."""
         (static, ratio, lead), (low, high) = point[:3], (self.axes[0].low, self.axes[0].high)
         total = math.log(0.5 * static * (1.0 + ratio) / low, high / low)
         return np.asarray(

@@ -264,7 +264,7 @@ def told_by_stem(run: FreeRun, decision: Decision, fits: Sequence[CandidateFit])
 
     A lag is of the valve where its stem comes as late, and of nothing behind the valve; where the
     stem does not, it is none of the valve's. So with all other effects of a valve that are left in
-    doubt with what lies behind it, or with each other: the nearest stem is most of twice as near.
+    doubt. Of several, those go whose stem is more than twice as far off as the nearest one.
     """
     chosen = decision.chosen
     if chosen is None or not decision.alternatives or not run.runs.stems_recorded:

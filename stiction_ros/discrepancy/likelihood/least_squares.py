@@ -50,9 +50,9 @@ def whitened_columns(columns: FloatArray, ar: FloatArray, rows: BoolArray) -> Fl
 
 @compiled
 def coefficients(columns: FloatArray, target: FloatArray) -> FloatArray:
-    """Return those of least squares, 0 of a column that depends on those before it.
+    """Return the factors of least squares, shape (q,); a column that earlier ones make up has 0.
 
-    Gram-Schmidt; a column that loses most of its length is made orthogonal twice.
+    By Gram-Schmidt. A column that loses most of its length is made orthogonal once more.
 
     Args:
         columns: shape (q, n).

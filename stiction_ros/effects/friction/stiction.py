@@ -127,8 +127,8 @@ class Stiction(Behaviour):
         "let OP reverse by more than the friction that matters, as a cycle does"
     )
     separation: ClassVar[str] = (
-        "ramp OP slowly through a reversal and back, and record the stem: after its rest it jumps "
-        "with stiction and follows smoothly with backlash"
+        "ramp OP slowly through a reversal and back, and record the stem: at the end of a "
+        "rest, a stem with stiction jumps and a stem with backlash follows OP smoothly"
     )
     family: ClassVar[str] = "friction"
     least: ClassVar[float] = 0.1  # %

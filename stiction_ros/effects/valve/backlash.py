@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, parameter
+from stiction_ros.effects.friction.stiction import Stiction
 from stiction_ros.effects.seen import Seen
 
 
@@ -22,10 +23,7 @@ class Backlash(Behaviour):
     effect: ClassVar[str] = "backlash"
     places: ClassVar[tuple[str, ...]] = ("valve",)
     experiment: ClassVar[str] = "let OP reverse by more than the play that matters"
-    separation: ClassVar[str] = (
-        "ramp OP slowly through a reversal and back, and record the stem: after its rest it jumps "
-        "with stiction and follows smoothly with backlash"
-    )
+    separation: ClassVar[str] = Stiction.separation
     family: ClassVar[str] = "friction"
     least: ClassVar[float] = 0.1  # %
     kernel: ClassVar[str] = "playing"
