@@ -59,7 +59,7 @@ def given_model(
         interval: between two samples of the record, s.
         tuning_known: whether it holds the tuning.
     """
-    a, b, delay = plant.sampled(interval)
+    a, b, delay = plant.sampled(interval, FINE * round(interval / base.sample_time))
     output: dict[str, Any] = {
         "name": "PV1",
         "a": a.tolist(),

@@ -30,6 +30,7 @@ from stiction_studies.field.hidden.effect import (
 )
 from stiction_studies.field.hidden.hidden_loop import HiddenLoop
 from stiction_studies.field.hidden.likelihood import Likelihood, random_form, true_form
+from stiction_studies.field.hidden.plants import FINE
 from stiction_studies.field.hidden.simulation import AT_REST, LEAD, Signals, run
 from stiction_studies.field.kernels import FloatArray
 
@@ -298,7 +299,8 @@ class Fits:
 
     def _behind(self, columns: FloatArray) -> FloatArray:
         """Return what the plant makes of loads that are held for a sample, same shape."""
-        a, b, delay = self.plant.sampled(self.loop.record.sample_time)
+        step, fine = self.loop.record.sample_time, FINE * self.loop.every
+        a, b, delay = self.plant.sampled(step, fine)
         return np.asarray(lfilter([*np.zeros(delay + 1), *b], [1.0, *a], columns, axis=0))
 
     def _steps(self) -> Iterator[tuple[Name, float]]:

@@ -66,27 +66,28 @@ class Plant:
         moved = expm(whole * h)
         return np.ascontiguousarray(moved[:n, :n]), np.ascontiguousarray(moved[:n, n]), c
 
-    def fine_dead_time(self, sample_time: float) -> int:
-        """Return the dead time in fine steps."""
-        return round(self.dead_time * FINE / sample_time)
+    def fine_dead_time(self, sample_time: float, fine: int = FINE) -> int:
+        """Return the dead time in fine steps, so many of them in a sample."""
+        return round(self.dead_time * fine / sample_time)
 
-    def sampled(self, sample_time: float) -> tuple[FloatArray, FloatArray, int]:
+    def sampled(self, sample_time: float, fine: int = FINE) -> tuple[FloatArray, FloatArray, int]:
         """Return a₁ …, b₁ … and whole samples of dead time under a stem held for a sample.
 
         The equation y_k = −a₁ y_{k−1} − … + b₁ χ_{k−1−d} + … is exact: its denominator has the
         plant's poles, its numerator follows from the answer to a pulse of one sample. A dead
-        time between two samples takes one more b.
+        time between two samples takes one more b. Of ``fine`` steps in a sample the dead time has
+        to be a whole number.
         """
-        a, b, c = self.stepped(sample_time / FINE)
-        dead = self.fine_dead_time(sample_time)
-        whole = dead // FINE
+        a, b, c = self.stepped(sample_time / fine)
+        dead = self.fine_dead_time(sample_time, fine)
+        whole = dead // fine
         poles = np.exp(np.array(self.poles()) * sample_time)
         denominator = np.real(np.poly(poles))
         n = len(poles)
         x, answer = np.zeros(n), [0.0]
-        for k in range(FINE * (n + 2)):
-            x = a @ x + b * float(0 <= k - (dead - whole * FINE) < FINE)
-            if (k + 1) % FINE == 0:
+        for k in range(fine * (n + 2)):
+            x = a @ x + b * float(0 <= k - (dead - whole * fine) < fine)
+            if (k + 1) % fine == 0:
                 answer.append(float(c @ x))
         numerator = np.convolve(denominator, answer)[1 : n + 2]
         if abs(numerator[-1]) < 1e-9 * np.abs(numerator).max():

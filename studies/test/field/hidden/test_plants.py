@@ -34,6 +34,16 @@ def test_the_sampled_equation_is_exact_under_a_stem_that_is_held(kind: str) -> N
         assert out.clean == pytest.approx(AT_REST + by_equation, abs=1e-9 * np.ptp(out.clean))
 
 
+def test_a_record_of_every_second_scan_has_the_dead_time_of_the_plant() -> None:
+    plant = Plant("flow", 1.5, (10.0, 4.0), 0.0, 5.0 / FINE)
+    by_hand = np.repeat(AT_REST + np.random.default_rng(2).standard_normal(150), 2)
+    base = Base(plant, simc(plant, 1.0, 2.0), 1.0, 1, False)
+    clean = run(base, Signals(np.full(300, AT_REST), *np.zeros((2, 300)), by_hand)).clean[::2]
+    a, b, delay = plant.sampled(2.0, 2 * FINE)
+    by_equation = lfilter([*np.zeros(delay + 1), *b], [1.0, *a], by_hand[::2] - AT_REST)
+    assert clean == pytest.approx(AT_REST + by_equation, abs=1e-9)
+
+
 def test_a_step_ends_at_the_gain_and_comes_after_the_dead_time() -> None:
     plant = Plant("flow", 1.5, (10.0, 4.0), 0.0, 7.0)
     base = Base(plant, simc(plant, 1.0, 2.0), 1.0, 1, False)
