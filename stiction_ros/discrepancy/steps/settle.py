@@ -4,6 +4,7 @@ import dataclasses
 
 from stiction_ros.discrepancy.decision.decide import (
     FRICTION,
+    GapVerdict,
     confirmed,
     large_enough,
     not_contradicted,
@@ -24,8 +25,19 @@ def settle(task: Task, state: State) -> State:
     state = best_of_wholes(task, state)
     other = mended(task, state)
     if other is not None:
-        state = best_of_wholes(task, look_on(task, other))
+        looked = best_of_wholes(task, look_on(task, other))
+        explains = _explains_more_than_it_leaves(state, looked)
+        state = looked if explains else dataclasses.replace(looked, now=state.now)
     return told_again(task, state) if len(state.now.effects) > 1 else state
+
+
+def _explains_more_than_it_leaves(given: State, other: State) -> bool:
+    """Tell whether another process explains more than what is left without a name behind it."""
+    last = other.looks[-1]
+    if last.decision.verdict is not GapVerdict.UNKNOWN:
+        return True
+    left = max(fit.evidence for fit in last.scores.fits)
+    return given.now.score - other.now.score > left
 
 
 def best_of_wholes(task: Task, state: State) -> State:
