@@ -58,9 +58,9 @@ def closing(task: Task, looked: State) -> Discrepancy:
         assert state.doubted is not None
         looked = settle(task, state.doubted)
         state, found = _named(task, looked)
+    state, found, louder = _beside_noise(task, state, found)
     base = state.now.base
     before, after = free_run_gap(state.before), free_run_gap(base)
-    louder = _louder(task, state)
     shown, answers = [of_data(finding) for finding in task.data], [*found, *louder]
     effects = [*shown, *answers]
     gained = state.before.score - base.score + sum(noise.delta_bic for noise in louder)
@@ -204,6 +204,26 @@ def _intervals(
 
     found = bootstrap_intervals(base, effect.fit, options.resamples, task.random, report, beside)
     return without_its_jump(found, effect)
+
+
+def _beside_noise(
+    task: Task, state: State, found: list[FoundEffect]
+) -> tuple[State, list[FoundEffect], list[FoundEffect]]:
+    """Return what is left when effects that only stand for a larger noise are gone, and the noise."""
+    louder = _louder(task, state)
+    for k in range(len(found) if louder else 0):
+        other = state.holding(state.now.others(k))
+        alone = _louder(task, other)
+        if alone and _worth(task, other, alone) <= _worth(task, state, louder):
+            return _beside_noise(task, *_named(task, other))
+    return state, found, louder
+
+
+def _worth(task: Task, state: State, louder: list[FoundEffect]) -> float:
+    """Return the worth of an explanation under the laws of its noise in place of the larger one."""
+    now, base = state.now, state.now.base
+    given = now.worth(task.options.margin) + base.score_under_declared - base.score
+    return given - sum(each.delta_bic for each in louder)
 
 
 def _louder(task: Task, state: State) -> list[FoundEffect]:
