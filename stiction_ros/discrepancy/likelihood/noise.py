@@ -95,7 +95,10 @@ class NoiseFit:
 
 
 def fit_noise(
-    target: FloatArray, columns: FloatArray, blocks: Blocks, start: FloatArray | None = None
+    target: FloatArray,
+    columns: FloatArray,
+    blocks: Blocks,
+    starts: Sequence[FloatArray | None] = (None,),
 ) -> NoiseFit:
     """Fit the linear columns and the noise to a gap by Gaussian likelihood, in turns.
 
@@ -103,11 +106,22 @@ def fit_noise(
         target: the gap, shape (N,).
         columns: linear columns, shape (N, q).
         blocks: rows; the first :data:`MAX_ORDER` of every run are in neither.
-        start: φ to begin with; None begins with white noise.
+        starts: φ to begin with, each once; None is white noise.
 
     Returns:
-        The best of the turns; the order p is the one of least BIC.
+        The best of the turns from all starts; the order p is the one of least BIC.
     """
+    own = {b"" if start is None else start.tobytes(): start for start in starts}
+    turns = [_in_turns(target, columns, blocks, start) for start in own.values()]
+    _, beta, residual, ar = min(turns, key=lambda turn: turn[0])
+    found = _result(residual, beta, ar, blocks, len(ar))
+    return found if len(ar) <= FIGURES else _remembering(target, columns, blocks, found)
+
+
+def _in_turns(
+    target: FloatArray, columns: FloatArray, blocks: Blocks, start: FloatArray | None
+) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+    """Return the score, β, what they leave and φ, both fitted in turns as long as that gains."""
     ar = np.zeros(0) if start is None else start
     best: tuple[float, FloatArray, FloatArray, FloatArray] | None = None
     for _ in range(ROUNDS):
@@ -120,9 +134,7 @@ def fit_noise(
             break
         ar = fitted
     assert best is not None
-    _, beta, residual, ar = best
-    found = _result(residual, beta, ar, blocks, len(ar))
-    return found if len(ar) <= FIGURES else _remembering(target, columns, blocks, found)
+    return best
 
 
 def _remembering(
@@ -155,16 +167,15 @@ def noise_forms(
 
     Args:
         target, columns, blocks: as for :func:`fit_noise`.
-        starts: φ with which the search for a noise of its own begins; None is white.
+        starts: of the search for a noise of its own.
         declared: φ of the noise that the model declares, several where an effect may or may
             not colour it; none where it declares nothing.
     """
-    own = {b"" if start is None else start.tobytes(): start for start in starts}
-    fits = [fit_noise(target, columns, blocks, start) for start in own.values()]
-    if declared:
-        fits = [dataclasses.replace(fit, price=fit.price + MARGIN, enlarged=True) for fit in fits]
-        fits += [given_noise(target, columns, blocks, ar) for ar in declared]
-    return fits
+    own = fit_noise(target, columns, blocks, starts)
+    if not declared:
+        return [own]
+    own = dataclasses.replace(own, price=own.price + MARGIN, enlarged=True)
+    return [own, *(given_noise(target, columns, blocks, ar) for ar in declared)]
 
 
 def given_noise(
