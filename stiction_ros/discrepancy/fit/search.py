@@ -169,7 +169,7 @@ class _Search:
         for done in range(ROUNDS):
             if done >= FAIR and best[1].delta_bic < self.best().delta_bic - SURE:
                 break
-            best = self._around(best, size, under)
+            best = self._around(best, size, under, judged=done >= FAIR - 1)
             size *= SHRINK
 
     def polish(self) -> None:
@@ -185,13 +185,17 @@ class _Search:
             best = better
 
     def _around(
-        self, best: tuple[FloatArray, CandidateFit], size: float, under: Under | None = None
+        self,
+        best: tuple[FloatArray, CandidateFit],
+        size: float,
+        under: Under | None = None,
+        judged: bool = True,
     ) -> tuple[FloatArray, CandidateFit]:
         """Return the best of a grid around a point and that point, with its coordinates."""
         axes = self.candidate.axes
         steps = np.array([axis.spacing for axis in axes])
         offsets = np.array(list(itertools.product(*[(0.0,) if a.linear else SIDES for a in axes])))
-        found = self._try(best[0] + offsets * (size * steps), best[1], under)
+        found = self._try(best[0] + offsets * (size * steps), best[1], under, judged)
         return found if under is not None or found[1].delta_bic >= best[1].delta_bic else best
 
     def breed(self) -> None:
@@ -262,7 +266,11 @@ class _Search:
         return self.judge(values[best], response.pick(best))
 
     def _try(
-        self, coordinates: FloatArray, like: CandidateFit | None = None, under: Under | None = None
+        self,
+        coordinates: FloatArray,
+        like: CandidateFit | None = None,
+        under: Under | None = None,
+        judged: bool = True,
     ) -> tuple[FloatArray, CandidateFit]:
         """Judge the point of a grid that is best under the noise of another fit, or a given one."""
         ar = self._searched(like) | dict(under or {})
@@ -272,6 +280,8 @@ class _Search:
         best = 0
         if len(values) > 1:
             best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
+        if not judged and like is not None:
+            return coordinates[best], like
         return coordinates[best], self.judge(values[best], response.pick(best))
 
     def judge(self, values: FloatArray, response: Response) -> CandidateFit:
