@@ -36,6 +36,15 @@ class Response:
             return self.shifts[output]
         return np.asarray(self.sizes[output] @ factors)
 
+    def towards(self, other: "Response", share: FloatArray) -> "Response":
+        """Return what lies a share, shape (G,), of the way to another response, or beyond it."""
+        shifts = {
+            i: self.shifts.get(i, 0.0)
+            + share * (other.shifts.get(i, 0.0) - self.shifts.get(i, 0.0))
+            for i in self.shifts.keys() | other.shifts.keys()
+        }
+        return Response(shifts, possible=self.possible)
+
     def pick(self, point: int) -> "Response":
         """Return the response at one point of the grid."""
         return Response(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.discrepancy.candidate.base import Candidate, Response
+from stiction_ros.discrepancy.candidate.base import Axis, Candidate, Response
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, whitened_block
 from stiction_ros.discrepancy.measures import EPSILON, PROBE, ROUNDING
 from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
@@ -108,26 +108,28 @@ def settled(
     candidate: Candidate,
     coordinates: FloatArray,
     ar: Mapping[int, FloatArray],
-) -> FloatArray:
-    """Return points with their linear figures at their best under given φ, shape (G, axes).
+) -> tuple[FloatArray, Response]:
+    """Return points with their linear figures at their best under given φ, and their response.
 
     Each figure has a normal prior round 0, with the range of the figure as standard deviation. So a
     figure stays near 0 where the rows say nothing about it.
     """
-    moved = coordinates.copy()
+    moved, response = coordinates.copy(), None
+
+    def respond(side: float, axis: Axis) -> Response:
+        moved[:, d] = side * PROBE * axis.high
+        return candidate.respond(base.run, candidate.values(moved))
+
     for d, axis in enumerate(candidate.axes):
         if not axis.linear:
             continue
-        scores = []
-        for side in (-1.0, 0.0, 1.0):
-            moved[:, d] = side * PROBE * axis.high
-            response = candidate.respond(base.run, candidate.values(moved))
-            scores.append(misfit(base, gap, response, ar))
-        kept = np.isfinite(scores).all(axis=0)  # elsewhere a side is no figure of the effect
-        scores = [np.where(kept, score, 0.0) for score in scores]
-        rows = sum(base.noise[i].rows for i in response.outputs)
-        low, middle, high = np.exp((np.array(scores) - np.min(scores, axis=0)) / max(rows, 1))
-        bend = np.maximum(low - 2.0 * middle + high, 0.0) + 2.0 * PROBE**2 / max(rows, 1)
+        middle, more = respond(0.0, axis), respond(1.0, axis)
+        sides = [middle.towards(more, np.array([-1.0])), middle, more]
+        scores = np.array([misfit(base, gap, side, ar) for side in sides])
+        rows = sum(base.noise[i].rows for i in middle.outputs)
+        low, level, high = np.exp((scores - np.min(scores, axis=0)) / max(rows, 1))
+        bend = np.maximum(low - 2.0 * level + high, 0.0) + 2.0 * PROBE**2 / max(rows, 1)
         vertex = np.clip(0.5 * PROBE * (low - high), -bend, bend) / bend
-        moved[:, d] = np.where(kept, vertex * axis.high, coordinates[:, d])
-    return moved
+        moved[:, d] = vertex * axis.high
+        response = middle.towards(more, vertex / PROBE)
+    return moved, response or candidate.respond(base.run, candidate.values(moved))

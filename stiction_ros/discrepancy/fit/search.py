@@ -274,15 +274,16 @@ class _Search:
     ) -> tuple[FloatArray, CandidateFit]:
         """Judge the point of a grid that is best under the noise of another fit, or a given one."""
         ar = self._searched(like) | dict(under or {})
-        coordinates = settled(self.base, self.gap, self.candidate, coordinates, ar)
-        values = self.candidate.values(coordinates)
-        response = self.candidate.respond(self.base.run, values)
+        coordinates, response = settled(self.base, self.gap, self.candidate, coordinates, ar)
         best = 0
-        if len(values) > 1:
+        if len(coordinates) > 1:
             best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
         if not judged and like is not None:
             return coordinates[best], like
-        return coordinates[best], self.judge(values[best], response.pick(best))
+        values = self.candidate.values(coordinates[[best]])
+        return coordinates[best], self.judge(
+            values[0], self.candidate.respond(self.base.run, values)
+        )
 
     def judge(self, values: FloatArray, response: Response) -> CandidateFit:
         """Return the fit at one point of the search; the best one is remembered."""

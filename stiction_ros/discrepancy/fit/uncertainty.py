@@ -83,8 +83,7 @@ def scored(
 ) -> tuple[FloatArray, FloatArray]:
     """Return coordinates, linear figures at their best, and the misfit there."""
     ar = {i: noise.ar for i, noise in fit.noise.items()}
-    points = settled(base, base.run.gap, fit.candidate, coordinates, ar)
-    response = fit.candidate.respond(base.run, fit.candidate.values(points))
+    points, response = settled(base, base.run.gap, fit.candidate, coordinates, ar)
     return points, misfit(base, base.run.gap, response, ar)
 
 
