@@ -48,6 +48,8 @@ class Axis:
     # parabola
     linear: bool = False
     natural: bool = False  # whether its ends are values like all others, no bounds of the search
+    # whether it is where something stood at first: no figure of the effect, none that counts
+    start: bool = False
 
     def grid(self) -> FloatArray:
         """Return the first grid, in coordinates of the search."""

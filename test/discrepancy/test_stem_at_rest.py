@@ -31,7 +31,7 @@ def test_a_stem_may_stand_at_the_edge_of_a_deadband_and_short_of_a_slip(
     )
     first = float(run.runs.op[0, 0])
     points = np.array([point])
-    assert candidate.starts(points, first)[0] == pytest.approx(first + off)
+    assert candidate.lead(points)[0] == pytest.approx(off)
     assert candidate.stems(run, points)[0, 0] == pytest.approx(first + off, abs=1e-6)
 
 

@@ -98,7 +98,7 @@ class Candidate(ABC):
 
     def count(self, point: FloatArray) -> int:
         """Return the number of free figures at a point, for BIC."""
-        return len(self.axes) + self.factors
+        return sum(not axis.start for axis in self.axes) + self.factors
 
     def grid(self) -> FloatArray:
         """Return the first grid in coordinates of the search, shape (G, axes)."""
@@ -142,9 +142,10 @@ class Candidate(ABC):
                 break
         return chosen
 
-    def lead(self, point: FloatArray) -> float:
-        """Return how far from OP a stem stands before the first sample, %."""
-        return 0.0
+    def lead(self, points: FloatArray) -> FloatArray:
+        """Return how far from what moves it something stands before the first sample, shape (G,)."""
+        found = any(axis.start for axis in self.axes)
+        return points[:, 1] if found else np.zeros(len(points))
 
     def leaps(self, point: FloatArray) -> bool:
         """Tell whether a stem that leaves its rest jumps by a size that matters."""
@@ -241,7 +242,7 @@ class KindCandidate(Candidate):
 
     def rows(self, points: FloatArray) -> FloatArray:
         """Return the behaviour's parameters, shape (G, parameters), for points of the grid."""
-        return points
+        return points[:, : len(self.kind.parameters())]
 
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         keys = [entry.key for entry in self.kind.parameters()]
@@ -261,10 +262,6 @@ def spans_of(figures: Sequence[Mapping[str, float]]) -> dict[str, tuple[float, f
 
 class Lagging(Candidate):
     """A lag by its time constant, where it begins, and how far it goes on between samples."""
-
-    def count(self, point: FloatArray) -> int:
-        """Return how many figures count: not where it begins, but how far it goes on."""
-        return max(len(point) - 1, 1)
 
     def between(
         self, run: FreeRun, points: FloatArray, output: int, valve: int | None = None

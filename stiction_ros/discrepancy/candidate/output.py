@@ -63,18 +63,11 @@ class FilterCandidate(KindCandidate, OutputCandidate):
         for rows in run.runs.slices:
             values = run.forced[rows, self.output]
             step = run.runs.sample_time
-            start = self.starts(points, float(values[0]))
+            start = float(values[0]) + self.lead(points)
             parts.append(self.kind.simulate_grid(self.rows(points), values, start, step))
         response = end_to_end(parts)
         response -= run.forced[:, self.output, None]
         return Response({self.output: response})
-
-    def starts(self, points: FloatArray, first: float) -> FloatArray:
-        """Return what the filters rest at before the first sample, shape (G,)."""
-        return np.full(len(points), first)
-
-    def rows(self, points: FloatArray) -> FloatArray:
-        return points[:, :1]
 
 
 class PoleCandidate(Lagging, FilterCandidate):
@@ -83,9 +76,6 @@ class PoleCandidate(Lagging, FilterCandidate):
     def answer(self, run: FreeRun, points: FloatArray) -> Response:
         shifts = super().answer(run, points).shifts
         return Response({i: v + self.between(run, points, i) for i, v in shifts.items()})
-
-    def starts(self, points: FloatArray, first: float) -> FloatArray:
-        return first + points[:, 1]
 
     def keeps(self, run: FreeRun, point: FloatArray) -> float | None:
         return math.exp(-run.runs.sample_time / max(float(point[0]), 1e-9))
@@ -128,7 +118,7 @@ def output_candidates(run: FreeRun) -> list[Candidate]:
         if float(np.ptp(run.forced[:, i])) <= 0.0:
             continue
         tag, span = run.model.outputs[i], float(np.ptp(run.forced[:, i]))
-        start = Axis(-10.0 * span, 10.0 * span, 1, linear=True)
+        start = Axis(-10.0 * span, 10.0 * span, 1, linear=True, start=True)
         delays = Axis(1.0, LONGEST_DELAY, LONGEST_DELAY, natural=True)
         found += [
             GainCandidate(place=f"process:{tag}", effect=ProcessGain.effect, output=i),

@@ -80,16 +80,12 @@ class ValveCandidate(KindCandidate):
             run.runs.records, map(run.runs.at_scans, run.runs.slices), strict=True
         ):
             values = run.scanned[part, self.valve]
-            start = self.starts(points, float(values[0]))
+            start = float(values[0]) + self.lead(points)
             if from_measured and record.stem is not None:
                 start = np.full(len(points), record.stem[0, record.valves.index(valve)])
             parts.append(self.kind.simulate_grid(rows, values, start, every))
         stems = end_to_end(parts)
         return over_samples(np.clip(stems, low, high, out=stems), run.runs)
-
-    def starts(self, points: FloatArray, first: float) -> FloatArray:
-        """Return where the stems stand before the first sample, shape (G,), %."""
-        return np.array([first + self.lead(point) for point in points])
 
     def answer(self, run: FreeRun, points: FloatArray) -> Response:
         stems = self.stems(run, points)
@@ -113,9 +109,6 @@ class Sliding(ValveCandidate):
             return stems
         return stems - points[:, -1] * not_yet_moved(run, stems)
 
-    def count(self, point: FloatArray) -> int:
-        return len(point) - 1
-
 
 class StictionCandidate(Sliding):
     """Stiction by f_S, f_D / f_S and the place of the stem in its band at the start."""
@@ -123,8 +116,8 @@ class StictionCandidate(Sliding):
     def rows(self, points: FloatArray) -> FloatArray:
         return np.column_stack([points[:, 0], points[:, 0] * points[:, 1]])
 
-    def lead(self, point: FloatArray) -> float:
-        return SHORT_OF_A_SLIP * float(point[0] * point[2])
+    def lead(self, points: FloatArray) -> FloatArray:
+        return SHORT_OF_A_SLIP * (points[:, 0] * points[:, 2])
 
     @property
     def stepped(self) -> bool:
@@ -169,24 +162,14 @@ class StictionCandidate(Sliding):
         )
 
 
-class OneFigure(ValveCandidate):
-    """A behaviour of one figure; what else is searched, as where the stem stood, is none of it."""
-
-    def rows(self, points: FloatArray) -> FloatArray:
-        return points[:, :1]
-
-    def count(self, point: FloatArray) -> int:
-        return 1
-
-
-class BacklashCandidate(Sliding, OneFigure):
+class BacklashCandidate(Sliding):
     """Backlash by its band and the place of the stem in it at the start."""
 
-    def lead(self, point: FloatArray) -> float:
-        return 0.5 * AT_REST * float(point[0] * point[1])
+    def lead(self, points: FloatArray) -> FloatArray:
+        return 0.5 * AT_REST * (points[:, 0] * points[:, 1])
 
 
-class LagCandidate(Lagging, OneFigure):
+class LagCandidate(Lagging, ValveCandidate):
     """A lag of the stem."""
 
     def answer(self, run: FreeRun, points: FloatArray) -> Response:
@@ -195,21 +178,9 @@ class LagCandidate(Lagging, OneFigure):
             {i: v + self.between(run, points, i, self.valve) for i, v in shifts.items()}
         )
 
-    def lead(self, point: FloatArray) -> float:
-        return float(point[1])
 
-
-@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class SlewCandidate(OneFigure):
+class SlewCandidate(ValveCandidate):
     """A slew by its rate, the place of the stem at the start, and how late it moves in a sample."""
-
-    reach: float  # how far off OP it may be at the start, %
-
-    def count(self, point: FloatArray) -> int:
-        return len(point) - 1
-
-    def lead(self, point: FloatArray) -> float:
-        return self.reach * float(point[1])
 
     def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
         stems = super().stems(run, points, from_measured=from_measured)
@@ -309,8 +280,8 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     low, high = float(op.min()), float(op.max())
     # A controller that winds up spends most of its time beyond the stem's end.
     lower, upper = np.quantile(op, [0.95, 0.05]).tolist()
-    start = Axis(-1.0, 1.0, 1)
-    away = Axis(-2.0 * span, 2.0 * span, 1, linear=True)
+    start, within = Axis(-1.0, 1.0, 1, start=True), Axis(-span, span, 1, start=True)
+    away = Axis(-2.0 * span, 2.0 * span, 1, linear=True, start=True)
     between = between_axes(any(run.runs.between[j : j + 1]))
     late = (Axis(-1.0, 1.0, 1, linear=True),) if between else ()
 
@@ -320,7 +291,7 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     largest = (1.0 - SLIGHT) * span  # what never moves the stem cannot be told
     figures = sizes(0.01 * span, largest, 50), Axis(0.0, 1.0, 9, natural=True), start, *late
     bands = sizes(0.02 * span, 1.8 * span, 24), start, *late
-    rates = sizes(0.003 * fastest, 0.95 * fastest, 24), start
+    rates = sizes(0.003 * fastest, 0.95 * fastest, 24), within
     ends = Axis(low, lower, 14, natural=True), Axis(upper, high, 14, natural=True)
     bends = Axis(-40.0, 40.0, 17), Axis(-30.0, 30.0, 1, linear=True)
     limits = tuple(run.model.limits[j].tolist())
@@ -328,7 +299,7 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
         StictionCandidate.at(run, j, HeStiction, figures, needle=True),
         StictionCandidate.at(run, j, XchStiction, figures),
         BacklashCandidate.at(run, j, Backlash, bands),
-        SlewCandidate.at(run, j, Slew, (*rates, *between), reach=span),
+        SlewCandidate.at(run, j, Slew, (*rates, *between)),
         LagCandidate.at(run, j, Lag, (lag_axis(run), away, *between)),
         SaturationCandidate.at(run, j, Saturation, ends, limits=limits),
         ValveCandidate.at(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),

@@ -210,7 +210,7 @@ def run_with(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> Fre
         model = model.with_effect(effect.place, effect.behaviour)
         kind, _, tag = effect.place.partition(":")
         if kind == "valve":
-            leads[tag] = effect.fit.candidate.lead(effect.fit.point)
+            leads[tag] = float(effect.fit.candidate.lead(effect.fit.point[None, :])[0])
     return FreeRun(model, runs, leads)
 
 
