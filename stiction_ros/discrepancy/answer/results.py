@@ -64,19 +64,14 @@ def not_considered(
     found = []
     for kind in behaviours():
         for place in kind.places:
-            if _by_other_means(kind, controller):
+            # the gate, the check of the controller or the list of the untestable has it
+            told = controller.status is not ControllerStatus.NOT_ASKED
+            if kind in SHOWN or kind is Offset or (told and kind in (Tuning, TimeShift)):
                 continue
             if (place, kind.effect) in keys and (kind.law is None or kind in searched):
                 continue
             found.append(NotConsidered(place, kind.effect, kind.law, _reason(kind, candidates)))
     return tuple(found)
-
-
-def _by_other_means(kind: type[Behaviour], controller: ControllerCheck) -> bool:
-    """Tell whether the gate, the check of the controller or the list of the untestable has it."""
-    if kind in (Tuning, TimeShift):
-        return controller.status is not ControllerStatus.NOT_ASKED
-    return kind in SHOWN or kind is Offset
 
 
 def _reason(kind: type[Behaviour], candidates: Sequence[Candidate]) -> str:
@@ -177,7 +172,7 @@ class Discrepancy:
     def not_considered(self) -> tuple[NotConsidered, ...]:
         """Every behaviour that was no candidate and is not named, with the reason.
 
-        Also ``spikes``, single samples that the gate left out before the search.
+        Also ``spikes``, single samples that were left out before the search.
         """
         tried = self.looks[0].scores.candidates if self.looks else ()
         named = {(e.place.partition(":")[0], e.effect) for e in self.effects}
@@ -186,7 +181,7 @@ class Discrepancy:
             for entry in not_considered(tried, self.controller)
             if (entry.place, entry.effect) not in named or entry.law is not None
         )
-        alone = zip(self.model_before.outputs, self.gate.alone, strict=True)
+        alone = zip(self.model_before.outputs, self.runs.alone, strict=True)
         said = [ALONE.format(name=name, count=count) for name, count in alone if count]
         return (*listed, *(NotConsidered("sensor", "spikes", None, each) for each in said))
 

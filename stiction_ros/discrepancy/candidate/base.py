@@ -143,7 +143,7 @@ class Candidate(ABC):
         return chosen
 
     def lead(self, points: FloatArray) -> FloatArray:
-        """Return how far from what moves it something stands before the first sample, shape (G,)."""
+        """Return how far off its input a stem or lag stands before the first sample, shape (G,)."""
         found = any(axis.start for axis in self.axes)
         return points[:, 1] if found else np.zeros(len(points))
 

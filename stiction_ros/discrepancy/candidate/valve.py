@@ -101,13 +101,18 @@ class ValveCandidate(KindCandidate):
 
 
 class Sliding(ValveCandidate):
-    """A friction. Its last figure, if asked, is by how many samples the stem moves late."""
+    """A friction or a slew. Its last figure, if asked, is by how many samples the stem moves late.
+
+    A slew by -½ acts on the samples alone, as in loop models.
+    """
 
     def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
         stems = super().stems(run, points, from_measured=from_measured)
-        if not self.axes[-1].linear or not points[:, -1].any():
+        if not self.axes[-1].linear:
             return stems
-        return stems - points[:, -1] * not_yet_moved(run, stems)
+        rates, middle = (points[:, 0], 0.5) if self.kind is Slew else (None, 0.0)
+        late = middle + points[:, -1]
+        return stems - late * not_yet_moved(run, stems, rates) if late.any() else stems
 
 
 class StictionCandidate(Sliding):
@@ -177,16 +182,6 @@ class LagCandidate(Lagging, ValveCandidate):
         return Response(
             {i: v + self.between(run, points, i, self.valve) for i, v in shifts.items()}
         )
-
-
-class SlewCandidate(ValveCandidate):
-    """A slew by its rate, the place of the stem at the start, and how late it moves in a sample."""
-
-    def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
-        stems = super().stems(run, points, from_measured=from_measured)
-        if points.shape[1] < 3:
-            return stems
-        return stems - (0.5 + points[:, 2]) * not_yet_moved(run, stems, points[:, 0])
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -299,7 +294,7 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
         StictionCandidate.at(run, j, HeStiction, figures, needle=True),
         StictionCandidate.at(run, j, XchStiction, figures),
         BacklashCandidate.at(run, j, Backlash, bands),
-        SlewCandidate.at(run, j, Slew, (*rates, *between)),
+        Sliding.at(run, j, Slew, (*rates, *between)),
         LagCandidate.at(run, j, Lag, (lag_axis(run), away, *between)),
         SaturationCandidate.at(run, j, Saturation, ends, limits=limits),
         ValveCandidate.at(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),

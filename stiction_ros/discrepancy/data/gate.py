@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.filled import drawn, held
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
-from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE, OFTEN, OUTLYING, TRACE, TRIED
+from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE, OFTEN
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
 from stiction_ros.effects.behaviour import BoolArray, IntArray
@@ -48,8 +48,6 @@ class Gate:
     set_point_moves: tuple[int, ...] | None
     reversals: tuple[int, ...]  # of OP per valve
     notes: tuple[str, ...]  # remarks for people
-    # per output, how many single samples far off both neighbours were left out
-    alone: tuple[int, ...]
 
 
 def open_gate(model: LoopModel, records: Sequence[Record]) -> tuple[Runs, Gate]:
@@ -63,7 +61,6 @@ def open_gate(model: LoopModel, records: Sequence[Record]) -> tuple[Runs, Gate]:
     filled = np.zeros_like(usable)
     findings: list[DataFinding] = []
     quanta, rounding, notes = [], [], []
-    lonely = [0] * len(model.outputs)
     for i, name in enumerate(model.outputs):
         quantum = quantum_of(runs.pv[:, i])
         quanta.append(quantum)
@@ -77,11 +74,6 @@ def open_gate(model: LoopModel, records: Sequence[Record]) -> tuple[Runs, Gate]:
                 for finding, where in (*frozen, *clipped):
                     usable[i, rows] &= ~where
                     findings.append(finding)
-            alone = _alone(values)
-            if alone.any():
-                usable[i, rows] &= ~alone
-                lonely[i] += int(alone.sum())
-                notes.append(f"{int(alone.sum())} samples of {name} stand alone and are not scored")
             if rounded:
                 continue
             lines, again = drawn(values, quantum), held(values, quantum, usable[i, rows])
@@ -108,7 +100,6 @@ def open_gate(model: LoopModel, records: Sequence[Record]) -> tuple[Runs, Gate]:
         _moves(model, runs),
         tuple(_reversals(runs, op) for op in runs.op.T),
         tuple(dict.fromkeys(notes)),
-        tuple(lonely),
     )
 
 
@@ -274,27 +265,6 @@ def _surprise(runs: Runs, output: int) -> float:
     if not rows.any():
         return math.inf
     return float(np.std(whiten(values, best_autoregression(values, rows, MAX_ORDER)[0])[rows]))
-
-
-def _alone(values: FloatArray) -> BoolArray:
-    """Return samples far off the straight line between their neighbours: up to three in a row.
-
-    The values before and after them must lie on the same line: at a step or a bend they do not.
-    """
-    found, scale = np.zeros(len(values), dtype=bool), TRACE * float(np.ptp(values))
-    slopes = np.diff(np.pad(values, 1, mode="edge"))
-    for count in range(1, min(TRIED, len(values) - 1)):
-        size = len(values) - count - 1
-        first, last = values[:size], values[-size:]
-        rise = (last - first) / (count + 1)
-        inside = [values[k : k + size] - first - k * rise for k in range(1, count + 1)]
-        away = np.abs(inside).min(axis=0)
-        bends = np.abs([rise - slopes[:size], rise - slopes[-size:]]).max(axis=0)
-        scale = max(float(np.median(away)), scale)
-        far = (away > OUTLYING * scale) & ((count + 1) * bends < 0.5 * away)
-        for k in range(1, count + 1):
-            found[k : k + size] |= far
-    return found
 
 
 def _moves(model: LoopModel, runs: Runs) -> tuple[int, ...] | None:

@@ -78,7 +78,7 @@ def fit_candidate(
     for centre in centres:
         search.refine(centre, 0.7)
     if candidate.sharp and around is None:
-        for ar, centre in search.blurred():
+        for ar, centre in search.blurred:
             search.refine(centre, 0.7, ar)
     if candidate.needle and around is None and search.best().delta_bic > 0.0:
         search.breed()
@@ -117,7 +117,8 @@ class _Search:
         self.base, self.gap, self.candidate = base, gap, candidate
         self.found: CandidateFit | None = None
         self.judged: dict[tuple[float, ...], CandidateFit] = {}
-        self.misfits: list[tuple[Under, FloatArray]] = []  # of the first grid, under noises
+        # the best points of the first grid under noises that blur sharp peaks, and these noises
+        self.blurred: list[tuple[Under, FloatArray]] = []
 
     def coarse(self) -> list[FloatArray]:
         """Return the best points of the first grid, under several guesses of the noise."""
@@ -127,7 +128,10 @@ class _Search:
         plausible = {i: self.base.plausible[i] for i in response.outputs}
         blurring: list[Under] = [dict.fromkeys(response.outputs, NO_MEMORY)]
         blurring += [plausible for _ in range(any(map(len, plausible.values())))]
-        self.misfits = [(ar, misfit(self.base, self.gap, response, ar)) for ar in blurring]
+        blurs = [misfit(self.base, self.gap, response, ar) for ar in blurring]
+        for ar, squares in zip(blurring, blurs, strict=True):
+            best = self.candidate.apart(grid, squares, TRIED)
+            self.blurred += [(ar, grid[k]) for k in best]
         guesses: list[Under] = [
             {i: self.base.noise[i].searched for i in response.outputs},
             dict.fromkeys(response.outputs, SLOW),
@@ -137,7 +141,7 @@ class _Search:
         for _ in range(3):
             tried = [misfit(self.base, self.gap, response, ar) for ar in guesses]
             if before is None:
-                tried += [squares for _, squares in self.misfits]
+                tried += blurs
             for squares in tried:
                 for point in self.candidate.apart(grid, squares, TRIED):
                     if point not in leaders:
@@ -149,13 +153,6 @@ class _Search:
             guesses = [{i: fit.searched for i, fit in before.noise.items()}]
         order = sorted(leaders, key=lambda point: -leaders[point])
         return [grid[point] for point in order]
-
-    def blurred(self) -> list[tuple[Under, FloatArray]]:
-        """Return the best points of the first grid under noises that blur sharp peaks."""
-        grid, found = self.candidate.grid(), []
-        for ar, squares in self.misfits:
-            found += [(ar, grid[k]) for k in self.candidate.apart(grid, squares, TRIED)]
-        return found
 
     def refine(self, centre: FloatArray, size: float, under: Under | None = None) -> None:
         """Search smaller and smaller grids, the first of ``size`` of its steps, around a point.

@@ -71,7 +71,7 @@ def _at_moments(base: Baseline, output: int, name: str) -> list[str]:
 
 
 def _moments(base: Baseline) -> dict[str, BoolArray]:
-    """Return rows shortly after moves of SP, after reversals of OP, and with OP at a limit."""
+    """Return rows shortly after moves of SP, and with OP at a limit."""
     run = base.run
     count = len(run.runs)
     found: dict[str, BoolArray] = {}
@@ -81,17 +81,13 @@ def _moments(base: Baseline) -> dict[str, BoolArray]:
             moved[rows][set_point_moves(record.sp)] = True
     reach = max(run.responses.skip + 10, 10)
     if moved.any():
-        found["after moves of the set-point"] = _after(moved, reach)
+        after = np.convolve(moved.astype(float), np.ones(reach))[:count]
+        found["after moves of the set-point"] = after > 0.0
     for j, valve in enumerate(run.model.valves):
         op = run.runs.op[:, j]
         if valve.limits is not None:
             found[f"while OP of {valve.name} is at a limit"] = np.isin(op, valve.limits)
     return found
-
-
-def _after(moments: BoolArray, reach: int) -> BoolArray:
-    kernel = np.ones(reach)
-    return np.asarray(np.convolve(moments.astype(float), kernel)[: len(moments)] > 0.0)
 
 
 def _change(residual: FloatArray, scored: BoolArray) -> tuple[int, float]:

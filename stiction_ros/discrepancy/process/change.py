@@ -168,16 +168,15 @@ class _Search:
             bound = self.values >= NEARLY_ALL * self.most
             bound |= (self.values <= NEARLY_ALL * self.least) & self.gains
             bound &= self.free
-            sure[bound & self._several()] = 0.0  # two lags that are alike trade off each other
+            kinds = [
+                f.what if free else "" for f, free in zip(self.figures, self.free, strict=True)
+            ]
+            sure[bound & [kinds.count(kind) > 1 for kind in kinds]] = 0.0  # alike, they trade off
             least = int(np.argmin(sure))
             if sure[least] > SURE:
                 return not bound.any()
             self.free[least], self.values[least], self.errors[least] = False, 0.0, np.inf
         return False
-
-    def _several(self) -> BoolArray:
-        kinds = [f.what if free else "" for f, free in zip(self.figures, self.free, strict=True)]
-        return np.array([bool(kind) and kinds.count(kind) > 1 for kind in kinds])
 
     def _settle(self) -> None:
         output, free = self.output, self.free

@@ -48,6 +48,7 @@ class Runs:
     filled: BoolArray
     # per output the distance of PV's values, however fine; 0 where there is none
     lattices: tuple[float, ...]
+    alone: tuple[int, ...]  # per output, how many readings that are off alone were left out
     # per valve what may act beside the recorded OP; empty where nothing does
     unseen: tuple[tuple[Unseen, ...], ...] = ()
     # per valve whether it is left open how late within a sample an effect that is added moves its
@@ -149,7 +150,7 @@ def join_records(model: LoopModel, records: Sequence[Record]) -> Runs:
     op = np.clip(op, low, high)
     none = (0.0,) * count
     filled = np.zeros_like(usable)
-    return Runs(tuple(records), op, pv, time, slices, usable, none, filled, none)
+    return Runs(tuple(records), op, pv, time, slices, usable, none, filled, none, (0,) * len(none))
 
 
 def _check(model: LoopModel, record: Record) -> None:

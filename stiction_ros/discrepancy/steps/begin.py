@@ -13,7 +13,7 @@ from stiction_ros.discrepancy.decision.explanation import Explanation
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap_options import GapOptions
-from stiction_ros.discrepancy.measures import NEARLY_ALL, SURPRISE
+from stiction_ros.discrepancy.measures import MARGIN, NEARLY_ALL, SURPRISE, TURNS
 from stiction_ros.discrepancy.process.first_model import liveliest_parts
 from stiction_ros.discrepancy.simulation.between import moves_on
 from stiction_ros.discrepancy.simulation.free_run import PHASES, FreeRun, Runs
@@ -23,6 +23,7 @@ from stiction_ros.discrepancy.steps.wholes import with_process
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
+from stiction_ros.signals.autoregression import whiten
 
 
 def begin(
@@ -46,8 +47,10 @@ def begin(
         unseen=unseen_of(runs, controller),
         between=() if options.process_fitted else _between(model),
     )
-    base = Baseline.of(FreeRun(model, runs))
+    base = without_spikes(Baseline.of(FreeRun(model, runs)))
     runs = with_surprises_fitted(base)
+    if runs is not base.run.runs:
+        base = Baseline.of(FreeRun(model, runs))
     bare = add_data_effects(model, data)
     task = Task(
         model=model,
@@ -60,8 +63,6 @@ def begin(
         report=progress or (lambda share: None),
         begun=begun,
     )
-    if runs is not base.run.runs:
-        base = Baseline.of(FreeRun(model, runs))
     state = State(given=bare, before=base, now=Explanation(bare, base))
     asked = in_doubt(runs, controller) and not options.process_fitted
     return _scanned(task, state) if asked else (task, state)
@@ -133,6 +134,36 @@ def add_data_effects(model: LoopModel, findings: Sequence[DataFinding]) -> LoopM
         document.setdefault("provenance", []).append(note | values)
         model = LoopModel.from_mapping(document, model.name)
     return model
+
+
+def without_spikes(base: Baseline) -> Baseline:
+    """Return the baseline without readings that are off where the process is not.
+
+    One that is off by w leaves the innovations w, −φ₁ w, … behind. This has to explain more than is
+    ever chance, as much as a shock of the process, and the margin more than a shock at any of the
+    samples beside it.
+
+    References:
+        I. Chang, G. C. Tiao, C. Chen, Technometrics 30 (1988) 193-204 (additive outliers).
+    """
+    from scipy.ndimage import maximum_filter
+
+    for _ in range(TURNS):  # many of them hide each other
+        runs, spikes = base.run.runs, np.zeros_like(base.run.runs.usable)
+        for i, (noise, blocks) in enumerate(zip(base.noise, base.blocks, strict=True)):
+            shocks, reach = noise.innovations / noise.innovation_std, max(len(noise.ar), 1)
+            gained = whiten(shocks[::-1], noise.ar)[::-1] ** 2 / (1.0 + noise.ar @ noise.ar)
+            near = np.ones(2 * reach + 1)
+            near[reach] = 0.0
+            beside = maximum_filter(shocks**2, footprint=near)
+            enough = (gained >= shocks**2) & (gained > np.maximum(beside + MARGIN, SURPRISE**2))
+            spikes[i] = blocks.scored & enough
+        if not spikes.any():
+            break
+        alone = tuple((runs.alone + spikes.sum(axis=1)).tolist())
+        runs = dataclasses.replace(runs, usable=runs.usable & ~spikes, alone=alone)
+        base = Baseline.of(FreeRun(base.run.model, runs))
+    return base
 
 
 def with_surprises_fitted(base: Baseline) -> Runs:

@@ -209,7 +209,7 @@ def _intervals(
 def _beside_noise(
     task: Task, state: State, found: list[FoundEffect]
 ) -> tuple[State, list[FoundEffect], list[FoundEffect]]:
-    """Return what is left when effects that only stand for a larger noise are gone, and the noise."""
+    """Return what is left without effects that only stand for a larger noise, and that noise."""
     louder = _louder(task, state)
     for k in range(len(found) if louder else 0):
         other = state.holding(state.now.others(k))

@@ -249,7 +249,7 @@ def test_samples_that_stand_alone_are_listed_as_not_searched() -> None:
     pv = sound.pv.copy()
     pv[100:600:50, 0] += 10.0
     answer = find_discrepancy(loop(), [dataclasses.replace(sound, pv=pv)], GapOptions(quick=True))
-    assert answer.gate.alone == (10,)
+    assert answer.runs.alone == (10,)
     (told,) = [entry for entry in answer.not_considered if entry.effect == "spikes"]
     assert told.place == "sensor"
     assert told.reason.startswith("samples of PV1 that stand alone, 10 of them, were left out")
