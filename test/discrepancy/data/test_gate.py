@@ -285,23 +285,3 @@ def test_values_on_a_coarse_lattice_or_at_an_end_are_not_thinned_out() -> None:
     values = record(loop()).pv[:, 0]
     assert not thinned(values, 0.1)
     assert not thinned(np.minimum(values, np.quantile(values, 0.8)), 1e-9)
-
-
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_samples_that_stand_alone_are_not_scored(count: int) -> None:
-    model, recorded = loop(), record(loop())
-    pv = recorded.pv.copy()
-    pv[300 : 300 + count, 0] += 9.0
-    runs, _ = open_gate(model, [dataclasses.replace(recorded, pv=pv)])
-    assert np.flatnonzero(~runs.usable[0]).tolist() == list(range(300, 300 + count))
-
-
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_spikes_on_a_slope_stand_alone_and_steps_and_bends_do_not(count: int) -> None:
-    time = np.arange(400.0)
-    pv = np.where(time < 100.0, 0.0, np.minimum(2.0 * (time - 100.0), 400.0))  # two bends
-    pv += np.where(time < 350.0, 0.0, 30.0) + 0.1 * np.random.default_rng(3).normal(size=400)
-    pv[200 : 200 + count] += 9.0
-    recorded = dataclasses.replace(record(loop()).part(0, 400), pv=pv[:, None])
-    runs, _ = open_gate(loop(), [recorded])
-    assert np.flatnonzero(~runs.usable[0]).tolist() == list(range(200, 200 + count))
