@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.discrepancy.candidate.base import Axis, Candidate, Response
+from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, whitened_block
 from stiction_ros.discrepancy.measures import EPSILON, PROBE, ROUNDING
 from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
@@ -116,14 +116,14 @@ def settled(
     """
     moved, response = coordinates.copy(), None
 
-    def respond(side: float, axis: Axis) -> Response:
-        moved[:, d] = side * PROBE * axis.high
+    def respond(value: float) -> Response:
+        moved[:, d] = value
         return candidate.respond(base.run, candidate.values(moved))
 
     for d, axis in enumerate(candidate.axes):
         if not axis.linear:
             continue
-        middle, more = respond(0.0, axis), respond(1.0, axis)
+        middle, more = respond(0.0), respond(PROBE * axis.high)
         sides = [middle.towards(more, np.array([-1.0])), middle, more]
         scores = np.array([misfit(base, gap, side, ar) for side in sides])
         rows = sum(base.noise[i].rows for i in middle.outputs)

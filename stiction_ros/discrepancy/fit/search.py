@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -269,18 +270,19 @@ class _Search:
         under: Under | None = None,
         judged: bool = True,
     ) -> tuple[FloatArray, CandidateFit]:
-        """Judge the point of a grid that is best under the noise of another fit, or a given one."""
+        """Return the best point of a grid under the noise of a fit, or a given one, and its fit.
+
+        Where it is not judged, it keeps the fit whose noise it was found under.
+        """
         ar = self._searched(like) | dict(under or {})
         coordinates, response = settled(self.base, self.gap, self.candidate, coordinates, ar)
-        best = 0
-        if len(coordinates) > 1:
-            best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
+        alone = len(coordinates) == 1
+        best = 0 if alone else int(np.argmin(misfit(self.base, self.gap, response, ar)))
         if not judged and like is not None:
             return coordinates[best], like
         values = self.candidate.values(coordinates[[best]])
-        return coordinates[best], self.judge(
-            values[0], self.candidate.respond(self.base.run, values)
-        )
+        fit = self.judge(values[0], self.candidate.respond(self.base.run, values))
+        return coordinates[best], fit
 
     def judge(self, values: FloatArray, response: Response) -> CandidateFit:
         """Return the fit at one point of the search; the best one is remembered."""
@@ -315,7 +317,8 @@ class _Search:
                 noise = {
                     i: self._noise(i, response, values, factors, rounded) for i in response.outputs
                 }
-        gained, held = -self.candidate.count(values) * self._price(response), 0.0
+        rows = max(2, sum(self.base.noise[i].rows for i in response.outputs))
+        gained, held = -self.candidate.count(values) * math.log(rows), 0.0
         before = self.base.noise if rounded else self.base.plain
         for i, left in noise.items():
             gained += before[i].bic(0) - left.bic(0)
@@ -347,10 +350,6 @@ class _Search:
         blocks = self.base.blocks[i]
         fits = noise_forms(target, columns, blocks, (None, self.base.noise[i].ar), forms)
         return best_noise(fits, self.base.run.runs.quanta[i] if rounded else 0.0, blocks)
-
-    def _price(self, response: Response) -> float:
-        rows = sum(self.base.noise[i].rows for i in response.outputs)
-        return float(np.log(max(rows, 2)))
 
 
 def _bred(cubes: FloatArray, random: np.random.Generator) -> FloatArray:

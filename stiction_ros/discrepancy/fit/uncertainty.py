@@ -52,6 +52,7 @@ class Region:
         centre = fit.candidate.coordinates(fit.point)
         width = np.array([SLIGHT * axes[d].spacing for d in free])
         halton, random = halton_sequence(len(free), seed=0), np.random.default_rng(0)
+        ar = {i: noise.ar for i, noise in fit.noise.items()}
         points, scores = np.zeros((0, len(axes))), np.zeros(0)
         kept = points
         for _ in range(FINE_ROUNDS):
@@ -61,7 +62,8 @@ class Region:
                 along = thrown[1 : SCATTERED // 2]
                 begun, one, other = (kept[random.integers(0, len(kept), len(along))] for _ in "123")
                 along[:] = begun + FARTHEST * random.random((len(along), 1)) * (one - other)
-            tried, found = scored(base, fit, thrown)
+            tried, response = settled(base, base.run.gap, fit.candidate, thrown, ar)
+            found = misfit(base, base.run.gap, response, ar)
             points, scores = np.vstack([points, tried]), np.concatenate([scores, found])
             kept = points[scores - scores.min() <= bound]
             reach = np.abs(kept[:, free] - centre[free]).max(axis=0, initial=0.0)
@@ -76,15 +78,6 @@ class Region:
         between = np.linspace(0, len(self.points) - 1, ALL_AROUND).astype(int)
         some = np.unique(np.concatenate([ends, between]))
         return Region(self.points[some], self.excess[some])
-
-
-def scored(
-    base: Baseline, fit: CandidateFit, coordinates: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return coordinates, linear figures at their best, and the misfit there."""
-    ar = {i: noise.ar for i, noise in fit.noise.items()}
-    points, response = settled(base, base.run.gap, fit.candidate, coordinates, ar)
-    return points, misfit(base, base.run.gap, response, ar)
 
 
 Intervals = dict[str, tuple[float, float]]
@@ -203,8 +196,7 @@ def _linear_ends(base: Baseline, fit: CandidateFit) -> list[FloatArray]:
         for side in (-width, width):
             end = fit.point.copy()
             end[d] = np.clip(end[d] + side, axis.low, axis.high)
-            if fit.candidate.possible(end[None, :]).all():
-                ends.append(end)
+            ends.append(end)
     return ends
 
 

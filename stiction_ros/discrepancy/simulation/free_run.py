@@ -146,9 +146,8 @@ def join_records(model: LoopModel, records: Sequence[Record]) -> Runs:
     usable = np.ones((pv.shape[1], len(pv)), dtype=bool)
     low, high = model.limits.T
     time = np.concatenate([r.time for r in records])
-    count = pv.shape[1]
     op = np.clip(op, low, high)
-    none = (0.0,) * count
+    none = (0.0,) * pv.shape[1]
     filled = np.zeros_like(usable)
     return Runs(tuple(records), op, pv, time, slices, usable, none, filled, none, (0,) * len(none))
 

@@ -153,8 +153,7 @@ def without_spikes(base: Baseline) -> Baseline:
         for i, (noise, blocks) in enumerate(zip(base.noise, base.blocks, strict=True)):
             shocks, reach = noise.innovations / noise.innovation_std, max(len(noise.ar), 1)
             gained = whiten(shocks[::-1], noise.ar)[::-1] ** 2 / (1.0 + noise.ar @ noise.ar)
-            near = np.ones(2 * reach + 1)
-            near[reach] = 0.0
+            near = np.arange(2 * reach + 1) != reach
             beside = maximum_filter(shocks**2, footprint=near)
             enough = (gained >= shocks**2) & (gained > np.maximum(beside + MARGIN, SURPRISE**2))
             spikes[i] = blocks.scored & enough

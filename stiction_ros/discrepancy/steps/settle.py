@@ -26,18 +26,12 @@ def settle(task: Task, state: State) -> State:
     other = mended(task, state)
     if other is not None:
         looked = best_of_wholes(task, look_on(task, other))
-        explains = _explains_more_than_it_leaves(state, looked)
-        state = looked if explains else dataclasses.replace(looked, now=state.now)
+        last, gained = looked.looks[-1], state.now.score - looked.now.score
+        left = max(fit.evidence for fit in last.scores.fits)
+        # what leaves more without a name than it explains is not known to be another process
+        unnamed = last.decision.verdict is GapVerdict.UNKNOWN and gained <= left
+        state = dataclasses.replace(looked, now=state.now) if unnamed else looked
     return told_again(task, state) if len(state.now.effects) > 1 else state
-
-
-def _explains_more_than_it_leaves(given: State, other: State) -> bool:
-    """Tell whether another process explains more than what is left without a name behind it."""
-    last = other.looks[-1]
-    if last.decision.verdict is not GapVerdict.UNKNOWN:
-        return True
-    left = max(fit.evidence for fit in last.scores.fits)
-    return given.now.score - other.now.score > left
 
 
 def best_of_wholes(task: Task, state: State) -> State:

@@ -59,7 +59,7 @@ def with_process(task: Task, state: State, part: Sequence[AddedEffect]) -> Expla
 
 
 def _best(task: Task, found: Sequence[Explanation | None]) -> Explanation | None:
-    whole = [each for each in found if each is not None]
+    whole = (each for each in found if each is not None)
     return min(whole, key=lambda each: each.worth(task.options.margin), default=None)
 
 
@@ -71,9 +71,10 @@ def same_thing(task: Task, changes: Sequence[ProcessChange], effects: Sequence[s
     of dead time less may be a scan between two samples, where no law shows that there is none.
     """
     whats = {change.what for change in changes}
-    if whats == {DELAY} and in_doubt(task.runs, task.controller):
-        half = MAJORITY * task.runs.sample_time
-        return all(-half < change.value < 0.0 for change in changes)
+    half = MAJORITY * task.runs.sample_time
+    earlier = whats == {DELAY} and all(-half < change.value < 0.0 for change in changes)
+    if earlier and in_doubt(task.runs, task.controller):
+        return True
     return whats == {GAIN} or (len(whats) == 1 and whats <= set(effects))
 
 

@@ -299,8 +299,7 @@ class Fits:
 
     def _behind(self, columns: FloatArray) -> FloatArray:
         """Return what the plant makes of loads that are held for a sample, same shape."""
-        step, fine = self.loop.record.sample_time, FINE * self.loop.every
-        a, b, delay = self.plant.sampled(step, fine)
+        a, b, delay = self.plant.sampled(self.loop.record.sample_time, FINE * self.loop.every)
         return np.asarray(lfilter([*np.zeros(delay + 1), *b], [1.0, *a], columns, axis=0))
 
     def _steps(self) -> Iterator[tuple[Name, float]]:

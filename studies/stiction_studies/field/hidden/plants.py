@@ -75,18 +75,16 @@ class Plant:
 
         The equation y_k = −a₁ y_{k−1} − … + b₁ χ_{k−1−d} + … is exact: its denominator has the
         plant's poles, its numerator follows from the answer to a pulse of one sample. A dead
-        time between two samples takes one more b. Of ``fine`` steps in a sample the dead time has
-        to be a whole number.
+        time between two samples, a whole number of ``fine`` steps, takes one more b.
         """
         a, b, c = self.stepped(sample_time / fine)
-        dead = self.fine_dead_time(sample_time, fine)
-        whole = dead // fine
+        whole, late = divmod(self.fine_dead_time(sample_time, fine), fine)
         poles = np.exp(np.array(self.poles()) * sample_time)
         denominator = np.real(np.poly(poles))
         n = len(poles)
         x, answer = np.zeros(n), [0.0]
         for k in range(fine * (n + 2)):
-            x = a @ x + b * float(0 <= k - (dead - whole * fine) < fine)
+            x = a @ x + b * float(0 <= k - late < fine)
             if (k + 1) % fine == 0:
                 answer.append(float(c @ x))
         numerator = np.convolve(denominator, answer)[1 : n + 2]
