@@ -167,7 +167,7 @@ class _Search:
         for done in range(ROUNDS):
             if done >= FAIR and best[1].delta_bic < self.best().delta_bic - SURE:
                 break
-            best = self._around(best, size, under, judged=done >= FAIR - 1)
+            best = self._around(best, size, under, done >= FAIR - 1)  # first by the start's noise
             size *= SHRINK
 
     def polish(self) -> None:
