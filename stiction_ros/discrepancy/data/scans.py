@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
-from stiction_ros.discrepancy.measures import OUTLYING
+from stiction_ros.discrepancy.measures import OUTLYING, TURNS
 from stiction_ros.discrepancy.simulation.free_run import FEWEST, Runs
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel
@@ -94,9 +94,10 @@ def _parts(model: LoopModel, runs: Runs) -> "list[_Part]":
 
 
 def _fitted(parts: "Sequence[_Part]") -> tuple[float, float]:
-    """Return K and K h / T_i by least squares, the errors between samples on a cubic through four.
+    """Return K and K h / T_i, the errors between samples on a cubic through four.
 
-    They are not where SP has moved: such samples are not asked.
+    They are not where SP has moved: such samples are not asked. Noise on the four does not bias the
+    figures, as an error before them is the instrument.
     """
     moves = np.concatenate([part.moves for part in parts])
     change = np.concatenate([np.diff(part.error) for part in parts])
@@ -104,8 +105,14 @@ def _fitted(parts: "Sequence[_Part]") -> tuple[float, float]:
     usual = float(np.median(np.abs(change)))
     rests = np.concatenate([_rests(part.error, OUTLYING * usual) for part in parts])
     asked = np.isfinite(moves) & rests
-    columns = np.column_stack([change, error])
-    gain, integral = np.linalg.lstsq(columns[asked], moves[asked], rcond=None)[0].tolist()
+    before = np.concatenate([np.pad(part.error, (2, 0), mode="edge")[:-3] for part in parts])
+    columns, instruments = np.column_stack([change, error]), np.column_stack([change, before])
+    for _ in range(TURNS):
+        known = instruments[asked].T
+        figures = np.linalg.lstsq(known @ columns[asked], known @ moves[asked])[0]
+        left = np.abs(moves - columns @ figures)
+        asked &= left <= OUTLYING * float(np.median(left[asked]))
+    gain, integral = figures.tolist()
     return gain, integral
 
 

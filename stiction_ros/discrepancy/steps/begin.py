@@ -13,7 +13,7 @@ from stiction_ros.discrepancy.decision.explanation import Explanation
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap_options import GapOptions
-from stiction_ros.discrepancy.measures import MARGIN, NEARLY_ALL, SURPRISE, TURNS
+from stiction_ros.discrepancy.measures import MARGIN, NEARLY_ALL, SLIGHT, SURPRISE, TURNS
 from stiction_ros.discrepancy.process.first_model import liveliest_parts
 from stiction_ros.discrepancy.simulation.between import moves_on
 from stiction_ros.discrepancy.simulation.free_run import PHASES, FreeRun, Runs
@@ -148,15 +148,18 @@ def without_spikes(base: Baseline) -> Baseline:
     """
     from scipy.ndimage import maximum_filter
 
+    rows, asked = np.arange(len(base.run.runs)), [blocks.scored for blocks in base.blocks]
     for _ in range(TURNS):  # many of them hide each other
         runs, spikes = base.run.runs, np.zeros_like(base.run.runs.usable)
-        for i, (noise, blocks) in enumerate(zip(base.noise, base.blocks, strict=True)):
-            shocks, reach = noise.innovations / noise.innovation_std, max(len(noise.ar), 1)
+        for i, (noise, usable) in enumerate(zip(base.noise, runs.usable, strict=True)):
+            if not usable.any():
+                continue
+            left = np.interp(rows, rows[usable], noise.residual[usable])
+            shocks, reach = whiten(left, noise.ar) / noise.innovation_std, max(len(noise.ar), 1)
             gained = whiten(shocks[::-1], noise.ar)[::-1] ** 2 / (1.0 + noise.ar @ noise.ar)
-            near = np.arange(2 * reach + 1) != reach
-            beside = maximum_filter(shocks**2, footprint=near)
-            enough = (gained >= shocks**2) & (gained > np.maximum(beside + MARGIN, SURPRISE**2))
-            spikes[i] = blocks.scored & enough
+            beside = maximum_filter(shocks**2, footprint=np.arange(2 * reach + 1) != reach)
+            enough = (gained >= (1.0 - SLIGHT) * shocks**2) & (gained > SURPRISE**2)
+            spikes[i] = asked[i] & usable & enough & (gained > beside + MARGIN)
         if not spikes.any():
             break
         alone = tuple((runs.alone + spikes.sum(axis=1)).tolist())
