@@ -9,7 +9,6 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.likelihood.least_squares import left_by, projector
-from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
 from stiction_ros.discrepancy.measures import NEARLY_ALL, SIDES, TRACE, TRIED
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import (
@@ -295,13 +294,8 @@ def surprises(run: FreeRun, innovations: list[FloatArray]) -> FloatArray:
 
     Noise with a long memory takes up a step but for the sample at which it comes.
     """
-    found: list[FloatArray] = []
-    for each in innovations:
-        sizes = np.abs(each)
-        for rows in run.runs.slices:
-            sizes[rows.start : rows.start + run.responses.skip + MAX_ORDER] = 0.0
-        found.append(run.runs.time[np.argsort(-sizes, kind="stable")[:SURPRISES]])
-    return np.concatenate(found)
+    ranked = [np.argsort(-np.abs(each), kind="stable")[:SURPRISES] for each in innovations]
+    return np.concatenate([run.runs.time[rows] for rows in ranked])
 
 
 def spectral_lines(values: list[FloatArray], lowest: float) -> FloatArray:
