@@ -5,6 +5,8 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.linalg import toeplitz
 
 from stiction_ros.discrepancy.data.controller_check import check_controller, in_doubt, unseen_of
 from stiction_ros.discrepancy.data.gate import DataFinding, open_gate
@@ -21,6 +23,7 @@ from stiction_ros.discrepancy.steps.look import scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import with_process
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
+from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 from stiction_ros.signals.autoregression import whiten
@@ -137,35 +140,52 @@ def add_data_effects(model: LoopModel, findings: Sequence[DataFinding]) -> LoopM
 
 
 def without_spikes(base: Baseline) -> Baseline:
-    """Return the baseline without readings that are off where the process is not.
-
-    One that is off by w leaves the innovations w, −φ₁ w, … behind. This has to explain more than is
-    ever chance, as much as a shock of the process, and the margin more than a shock at any of the
-    samples beside it.
-
-    References:
-        I. Chang, G. C. Tiao, C. Chen, Technometrics 30 (1988) 193-204 (additive outliers).
-    """
-    from scipy.ndimage import maximum_filter
-
+    """Return the baseline without readings, one or two in a row, that are off alone."""
     rows, asked = np.arange(len(base.run.runs)), [blocks.scored for blocks in base.blocks]
     for _ in range(TURNS):  # many of them hide each other
         runs, spikes = base.run.runs, np.zeros_like(base.run.runs.usable)
         for i, (noise, usable) in enumerate(zip(base.noise, runs.usable, strict=True)):
-            if not usable.any():
-                continue
-            left = np.interp(rows, rows[usable], noise.residual[usable])
-            shocks, reach = whiten(left, noise.ar) / noise.innovation_std, max(len(noise.ar), 1)
-            gained = whiten(shocks[::-1], noise.ar)[::-1] ** 2 / (1.0 + noise.ar @ noise.ar)
-            beside = maximum_filter(shocks**2, footprint=np.arange(2 * reach + 1) != reach)
-            enough = (gained >= (1.0 - SLIGHT) * shocks**2) & (gained > SURPRISE**2)
-            spikes[i] = asked[i] & usable & enough & (gained > beside + MARGIN)
+            if usable.any():
+                left = np.interp(rows, rows[usable], noise.residual[usable])
+                shocks = whiten(left, noise.ar) / noise.innovation_std
+                spikes[i] = asked[i] & usable & _alone(shocks, noise.ar)
         if not spikes.any():
             break
         alone = tuple((runs.alone + spikes.sum(axis=1)).tolist())
         runs = dataclasses.replace(runs, usable=runs.usable & ~spikes, alone=alone)
         base = Baseline.of(FreeRun(base.run.model, runs))
     return base
+
+
+def _alone(shocks: FloatArray, ar: FloatArray) -> BoolArray:
+    """Return which readings are off where the process is not, shape (N,).
+
+    One that is off by w leaves the innovations w, −φ₁ w, … behind. This has to explain more than is
+    ever chance, as much as a shock of the process, and the margin more than a shock at any of the
+    samples beside it.
+
+    Args:
+        shocks: innovations, standard deviations, shape (N,).
+        ar: φ.
+
+    References:
+        I. Chang, G. C. Tiao, C. Chen, Technometrics 30 (1988) 193-204 (additive outliers).
+    """
+    found, least, reach = np.zeros(len(shocks), dtype=bool), np.zeros(len(shocks) + 1), len(ar) + 1
+    left, back, law = shocks**2, whiten(shocks[::-1], ar)[::-1], np.array([1.0, *-ar, 0.0])
+    around = sliding_window_view(np.pad(left, reach), reach).max(axis=1)
+    for count in (1, 2):
+        parts, size = sliding_window_view(back, count), len(shocks) - count + 1
+        each = toeplitz([law[: len(law) - k] @ law[k:] for k in range(count)])
+        gained = np.einsum("ki,ij,kj->k", parts, np.linalg.inv(each), parts)
+        own = sliding_window_view(left, count).max(axis=1)
+        beside = np.maximum(around[:size], around[reach + count :][:size])
+        due = np.maximum(least[:-1], least[1:]) + SURPRISE**2
+        off = (gained > due) & (gained > beside + MARGIN) & (gained >= (1.0 - SLIGHT) * own)
+        for k in range(count):
+            found[k : k + size] |= off
+        least = gained
+    return found
 
 
 def with_surprises_fitted(base: Baseline) -> Runs:
