@@ -269,9 +269,7 @@ class Lagging(Candidate):
         """Return what goes on between samples, shape (N, G), as far as the points say, if they do.
 
         Args:
-            run: of the current model.
-            points: shape (G, axes).
-            output: index of the output.
+            run, points, output: of the model, shape (G, axes), and its index.
             valve: index of the valve that is slow; None for the process and the sensor.
         """
         if points.shape[1] < 3:

@@ -41,14 +41,9 @@ def drawn(values: FloatArray, quantum: float) -> BoolArray:
 
 
 def _too_often(sizes: FloatArray, digits: float, values: FloatArray) -> BoolArray:
-    """Return which sizes are nothing, as far as digits tell, shape (n,).
+    """Return which sizes of differences are nothing, as far as digits of the values tell.
 
-    None where they are not so more often than they are small.
-
-    Args:
-        sizes: that would be spread about nothing smoothly by noise, shape (n,).
-        digits: that a size of nothing may seem to have by the rounding of the values.
-        values: of which they are the differences.
+    None where they are not so more often than they are small, as noise would spread them.
     """
     digits = max(digits, FLOAT * float(np.abs(values).max()))
     nothing, small = sizes <= digits, sizes <= NEARLY * digits

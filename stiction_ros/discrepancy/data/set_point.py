@@ -108,13 +108,8 @@ class _Part:
     ) -> FloatArray:
         """Return SP between its moves, by least squares of its rests and of its jumps.
 
-        With two scans in a sample SP may move at either; the one that is nearer is taken.
-
-        Args:
-            jumps: s where SP moves, shape (n − 1,).
-            means: of s between them, shape (n,).
-            counts: samples of each mean, shape (n,); where there are none, the jumps alone tell.
-            gain, integral: K and I.
+        With two scans in a sample SP may move at either; the one that is nearer is taken. Where a
+        mean is of no samples, the jumps alone tell.
         """
         whole = self.scans * integral
         first = means / whole

@@ -224,12 +224,7 @@ class _Search:
         return self.moved_by(run, run.gap[:, self.output])
 
     def moved_by(self, run: FreeRun, gap: FloatArray) -> FloatArray:
-        """Return what a unit of every free figure moves of a run, shape (N, figures).
-
-        Args:
-            run: of the model with the figures as they are.
-            gap: that it leaves of this output, shape (N,).
-        """
+        """Return what a unit of every free figure moves of a run with this gap, (N, figures)."""
         moved = []
         for k, each in enumerate(np.eye(len(self.free))):
             if self.free[k]:

@@ -158,15 +158,11 @@ def without_spikes(base: Baseline) -> Baseline:
 
 
 def _alone(shocks: FloatArray, ar: FloatArray) -> BoolArray:
-    """Return which readings are off where the process is not, shape (N,).
+    """Return which readings are off where the process is not, by innovations over σ, shape (N,).
 
     One that is off by w leaves the innovations w, −φ₁ w, … behind. This has to explain more than is
     ever chance, as much as a shock of the process, and the margin more than a shock at any of the
     samples beside it.
-
-    Args:
-        shocks: innovations, standard deviations, shape (N,).
-        ar: φ.
 
     References:
         I. Chang, G. C. Tiao, C. Chen, Technometrics 30 (1988) 193-204 (additive outliers).

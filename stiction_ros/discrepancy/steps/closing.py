@@ -185,13 +185,9 @@ def _found(task: Task, state: State) -> list[FoundEffect]:
 def _intervals(
     task: Task, state: State, k: int, base: Baseline, beside: list[FloatArray]
 ) -> Intervals:
-    """Return those of the k-th effect.
+    """Return those of the k-th effect, by the model with all others.
 
-    Args:
-        task, state, k: whose.
-        base: of the model with all other effects.
-        beside: per output what these, and what of the process was changed, would do by other
-            figures, shape (N, q).
+    Beside it is, per output, what these and a changed process would do by other figures.
     """
     effect, options = state.now.effects[k], task.options
     if options.quick:
