@@ -282,10 +282,9 @@ def _not_told(run: FreeRun, load: WaveCandidate, found: list[Candidate]) -> int 
     (output,) = response.outputs
     key = f"{DISTURBANCE}:{run.model.outputs[output]}", load.effect
     place, same = next((k, each) for k, each in enumerate(found) if each.key == key)
-    wave = same.respond(run, point).sizes[output][:, 0]
-    basis = projector(np.hstack([wave, run.free[output]]))
-    left = left_by(basis, response.sizes[output][:, 0])
-    told = float(np.sum(left**2)) > TRACE**2 * float(np.sum(response.sizes[output] ** 2))
+    seen, wave = run.blocks(output).scored, same.respond(run, point).sizes[output][:, 0]
+    own, basis = response.sizes[output][seen, 0], np.hstack([wave, run.free[output]])[seen]
+    told = np.sum(left_by(projector(basis), own) ** 2) > TRACE**2 * np.sum(own**2)
     return None if told else place
 
 
