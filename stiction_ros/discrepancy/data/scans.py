@@ -105,6 +105,8 @@ def _fitted(parts: "Sequence[_Part]") -> tuple[float, float]:
     usual = float(np.median(np.abs(change)))
     rests = np.concatenate([_rests(part.error, OUTLYING * usual) for part in parts])
     asked = np.isfinite(moves) & rests
+    if not asked.any():
+        return 0.0, 0.0
     before = np.concatenate([np.pad(part.error, (2, 0), mode="edge")[:-3] for part in parts])
     columns, instruments = np.column_stack([change, error]), np.column_stack([change, before])
     for _ in range(TURNS):
@@ -112,8 +114,7 @@ def _fitted(parts: "Sequence[_Part]") -> tuple[float, float]:
         figures = np.linalg.lstsq(known @ columns[asked], known @ moves[asked])[0]
         left = np.abs(moves - columns @ figures)
         asked &= left <= OUTLYING * float(np.median(left[asked]))
-    gain, integral = figures.tolist()
-    return gain, integral
+    return float(figures[0]), float(figures[1])
 
 
 def between_samples(values: FloatArray) -> FloatArray:

@@ -147,7 +147,8 @@ def without_spikes(base: Baseline) -> Baseline:
         for i, (noise, usable) in enumerate(zip(base.noise, runs.usable, strict=True)):
             if usable.any():
                 left = np.interp(rows, rows[usable], noise.residual[usable])
-                shocks = whiten(left, noise.ar) / noise.innovation_std
+                scale = max(noise.innovation_std, runs.quanta[i] / SURPRISE)  # a step is no spike
+                shocks = whiten(left, noise.ar) / scale
                 spikes[i] = asked[i] & usable & _alone(shocks, noise.ar)
         if not spikes.any():
             break
