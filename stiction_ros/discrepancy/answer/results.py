@@ -61,11 +61,10 @@ def not_considered(
     """
     keys = {(place.partition(":")[0], name) for c in candidates for place, name in c.keys}
     searched = {getattr(c, "kind", c.about) for c in candidates if c.inside}
-    found = []
+    told, found = controller.status is not ControllerStatus.NOT_ASKED, []
     for kind in behaviours():
         for place in kind.places:
             # the gate, the check of the controller or the list of the untestable has it
-            told = controller.status is not ControllerStatus.NOT_ASKED
             if kind in SHOWN or kind is Offset or (told and kind in (Tuning, TimeShift)):
                 continue
             if (place, kind.effect) in keys and (kind.law is None or kind in searched):

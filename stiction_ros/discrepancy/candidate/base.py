@@ -144,8 +144,8 @@ class Candidate(ABC):
 
     def lead(self, points: FloatArray) -> FloatArray:
         """Return how far off its input a stem or lag stands before the first sample, shape (G,)."""
-        found = any(axis.start for axis in self.axes)
-        return points[:, 1] if found else np.zeros(len(points))
+        own = [points[:, d] for d, axis in enumerate(self.axes) if axis.start]
+        return own[0] if own else np.zeros(len(points))
 
     def leaps(self, point: FloatArray) -> bool:
         """Tell whether a stem that leaves its rest jumps by a size that matters."""

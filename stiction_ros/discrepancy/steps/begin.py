@@ -50,10 +50,8 @@ def begin(
         unseen=unseen_of(runs, controller),
         between=() if options.process_fitted else _between(model),
     )
-    base = without_spikes(Baseline.of(FreeRun(model, runs)))
-    runs = with_surprises_fitted(base)
-    if runs is not base.run.runs:
-        base = Baseline.of(FreeRun(model, runs))
+    base = with_surprises_fitted(without_spikes(Baseline.of(FreeRun(model, runs))))
+    runs = base.run.runs
     bare = add_data_effects(model, data)
     task = Task(
         model=model,
@@ -185,8 +183,8 @@ def _alone(shocks: FloatArray, ar: FloatArray) -> BoolArray:
     return found
 
 
-def with_surprises_fitted(base: Baseline) -> Runs:
-    """Return the records, other blocks kept back where those hold all of what nothing foretells.
+def with_surprises_fitted(base: Baseline) -> Baseline:
+    """Return the baseline, other blocks kept back where those hold all of what nothing foretells.
 
     Behind noise that forgets nothing, the step of a level is a single innovation. Kept back, it
     tells that something happened, but neither what nor how much.
@@ -198,8 +196,8 @@ def with_surprises_fitted(base: Baseline) -> Runs:
         most = kept[usual] > NEARLY_ALL * float(part.sum())
         phases.append(min(kept, key=kept.__getitem__) if most else usual)
     if tuple(phases) == runs.phases:
-        return runs
-    return dataclasses.replace(runs, phases=tuple(phases))
+        return base
+    return Baseline.of(FreeRun(base.run.model, dataclasses.replace(runs, phases=tuple(phases))))
 
 
 def _beyond_chance(base: Baseline) -> FloatArray:

@@ -207,10 +207,13 @@ def _beside_noise(
 ) -> tuple[State, list[FoundEffect], list[FoundEffect]]:
     """Return what is left without effects that only stand for a larger noise, and that noise."""
     louder = _louder(task, state)
-    for k in range(len(found) if louder else 0):
+    if not louder:
+        return state, found, louder
+    worth = _worth(task, state, louder)
+    for k in range(len(found)):
         other = state.holding(state.now.others(k))
         alone = _louder(task, other)
-        if alone and _worth(task, other, alone) <= _worth(task, state, louder):
+        if alone and _worth(task, other, alone) <= worth:
             return _beside_noise(task, *_named(task, other))
     return state, found, louder
 

@@ -22,7 +22,7 @@ def with_blow(at: int | None) -> Runs:
 
 
 def fitted(runs: Runs) -> Runs:
-    return with_surprises_fitted(Baseline.of(FreeRun(loop(), runs)))
+    return with_surprises_fitted(Baseline.of(FreeRun(loop(), runs))).run.runs
 
 
 def test_what_nothing_foretells_is_fitted() -> None:
