@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -106,16 +107,19 @@ class _Judge:
         for each in self.values:  # what is no measurement is drawn between its neighbours
             each[~seen] = np.interp(rows[~seen], rows[seen], each[seen])
 
-    def score(self, block: Block) -> _Score:
-        """Return how likely the states of a law are beside those of the declared noise."""
-        own, blocks = self.own, self.blocks
+    def scores(self, found: Sequence[Block]) -> list[_Score]:
+        """Return how likely the states of laws are beside those of the declared noise."""
+        own = self.own
         unit = max(own.r, float(np.trace(own.q)), TINY)
-        a, c = block_diag(own.a, block.a), np.concatenate([own.c, block.c])
-        white = max(own.r, TRACE * unit) / unit
-        steady = steady_gain(a, block_diag(own.q, block.q) / unit, c, white)
-        if steady is None:
-            return _Score(math.inf, 0.0, 1.0)
-        gain, missed = steady
+        a = np.stack([block_diag(own.a, each.a) for each in found])
+        q = np.stack([block_diag(own.q, each.q) / unit for each in found])
+        c = np.concatenate([own.c, found[0].c])
+        steady = zip(a, *steady_gain(a, q, c, max(own.r / unit, TRACE)), strict=True)
+        return [self._score(each, gain, c, missed * unit) for each, gain, missed in steady]
+
+    def _score(self, a: FloatArray, gain: FloatArray, c: FloatArray, foretold: float) -> _Score:
+        """Return how likely it is what a gain leaves, whose variance is foretold."""
+        blocks = self.blocks
         over, under = (np.real(np.poly(each)) for each in (a, a - np.outer(gain, c)))
         parts = [lfilter(over, under, self.values[:, rows], axis=1) for rows in self.records]
         left = left_by_columns(np.hstack(parts), self.values, blocks.train)
@@ -124,16 +128,14 @@ class _Judge:
         log = math.log(2.0 * math.pi * variance)
         outside = np.minimum(outside**2 / variance, SURPRISE**2)
         held = len(outside) * log + float(outside.sum())
-        return _Score(len(inside) * (log + 1.0), held, math.sqrt(variance / missed / unit))
+        return _Score(len(inside) * (log + 1.0), held, math.sqrt(variance / foretold))
 
     def fitted(self, law: Law) -> NoiseEffect | None:
-        """Return a law with its figures; None where one holds nothing, or none is steady."""
+        """Return a law with its figures; None where one holds nothing."""
         points, scores = self.lattice(law)
         fitted = np.array([score.fitted for score in scores])
         best, (low, high) = int(np.argmin(fitted)), law.range
         found = points[best]
-        if not math.isfinite(fitted[best]):
-            return None
         if np.any(found < low + CLEAR) or np.any(found[1:] > high[1:] - CLEAR):
             return None  # on the bound of its range: then it is no name
         rows = max(int(self.blocks.train.sum()), 2)
@@ -159,10 +161,8 @@ class _Judge:
             step = (high - low) / (POINTS - 1)
             meshed = np.meshgrid(*np.linspace(low, high, POINTS).T, indexing="ij")
             points = np.stack([each.ravel() for each in meshed], axis=1)
-            scores = [self.score(law.block(point)) for point in points]
+            scores = self.scores([law.block(point) for point in points])
             fitted = np.array([score.fitted for score in scores])
-            if not np.isfinite(fitted).any():
-                break  # no figures predict it steadily
             bound = SMOOTH if turn <= 1 else SURE
             kept = points[fitted - fitted.min() <= bound]
             low = np.maximum(kept.min(axis=0) - step, law.range[0])

@@ -7,15 +7,17 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import block_diag, solve_discrete_are, solve_toeplitz
+from scipy.linalg import block_diag, solve_toeplitz
 
 from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.likelihood.slow_noise import REMEMBERED, counting
-from stiction_ros.discrepancy.measures import NEGLIGIBLE, TRACE
+from stiction_ros.discrepancy.measures import NEGLIGIBLE, ROUNDING, TRACE
 from stiction_ros.effects import ColouredDisturbance, FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, NoiseEntry, Process
 from stiction_ros.signals.autoregression import companion
+
+DOUBLINGS = 20  # of the samples of a prediction: no record is longer
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,10 +98,8 @@ def rounded(noise: DeclaredNoise, quantum: float) -> DeclaredNoise:
         return noise
     driven, look = np.zeros((count, count)), np.eye(count)[0]
     driven[0, 0] = 1.0
-    steady = steady_gain(companion(noise.ar), driven, look, white / noise.std**2)
-    if steady is None:
-        return noise
-    gain, missed = steady
+    white /= noise.std**2
+    (gain,), (missed,) = steady_gain(companion(noise.ar)[None], driven[None], look, white)
     moving = np.concatenate([[1.0], gain - noise.ar])  # of the innovations, over A
     inverse = np.asarray(lfilter([1.0], moving, np.eye(1, REMEMBERED)[0]))
     last = int(np.max(np.flatnonzero(np.abs(inverse) > NEGLIGIBLE))) + 1
@@ -177,10 +177,8 @@ def beside_unseen(
         excited[0, 0] = noise.std**2
     states, moved = block_diag(own, passed), block_diag(excited, driven)
     look = np.concatenate([np.eye(1, len(own))[0], shown])
-    steady = steady_gain(states, moved, look, max(white, TRACE * noise.std**2))
-    if steady is None:
-        return None
-    gain, missed = steady
+    white = max(white, TRACE * noise.std**2)
+    (gain,), (missed,) = steady_gain(states[None], moved[None], look, white)
     whitening, kept, state = np.zeros(REMEMBERED), states - np.outer(gain, look), gain.copy()
     for lag in range(REMEMBERED):
         whitening[lag] = look @ state
@@ -223,26 +221,31 @@ def _alike(one: DeclaredNoise, other: DeclaredNoise) -> bool:
     return float(np.abs(apart).max(initial=0.0)) <= NEGLIGIBLE
 
 
-@np.errstate(invalid="ignore")  # SciPy scales by 0 where there is no steady gain
 def steady_gain(
     a: FloatArray, q: FloatArray, c: FloatArray, r: float
-) -> tuple[FloatArray, float] | None:
-    """Return Kalman's gain, shape (n,), and the variance of what its predictions miss.
+) -> tuple[FloatArray, FloatArray]:
+    """Return Kalman's gains, shape (G, n), and the variances of what their predictions miss, (G,).
 
-    None where there is no steady one.
+    They are those after a million samples, by doubling, or before what no output tells has grown
+    beyond all bounds: the levels of two noises of which only the sum is seen.
 
     Args:
-        a, q: of the states, shape (n, n).
+        a, q: of the states, shape (G, n, n).
         c: of the one output, shape (n,).
-        r: its variance.
+        r: its variance, above 0.
+
+    References:
+        E. K.-W. Chu, H.-Y. Fan, W.-W. Lin, C.-S. Wang, Int. J. Control 77 (2004) 767-788.
     """
-    if not len(a):
-        return np.zeros(0), r
-    try:
-        p = solve_discrete_are(a.T, c[:, None], q, np.array([[r]]))
-    except ValueError:  # LinAlgError is one
-        return None
-    missed = float(c @ p @ c) + r
-    gain = np.asarray(a @ p @ c / missed)
-    forgets = np.abs(np.linalg.eigvals(a - np.outer(gain, c))).max() < 1.0
-    return (gain, missed) if forgets else None
+    eye, moves, p = np.eye(len(c)), np.swapaxes(a, 1, 2), q
+    told = np.broadcast_to(np.outer(c, c) / r, a.shape)
+    for _ in range(DOUBLINGS):
+        now = np.linalg.solve(eye + told @ p, np.concatenate([moves, told], axis=2))
+        on, across = now[:, :, : len(c)], now[:, :, len(c) :]
+        back = np.swapaxes(moves, 1, 2)
+        more = p + back @ p @ on
+        if np.abs(more).max(initial=0.0) > np.abs(q).max(initial=0.0) / ROUNDING:
+            break
+        told, p, moves = told + moves @ across @ back, more, moves @ on
+    missed = c @ p @ c + r
+    return a @ p @ c / missed[:, None], missed

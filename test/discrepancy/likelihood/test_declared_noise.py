@@ -5,7 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 from gap_loops import loop, record
-from scipy.linalg import block_diag
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.linalg import block_diag, solve_discrete_are
 from scipy.signal import lfilter
 
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
@@ -30,7 +32,7 @@ from stiction_ros.effects import (
 )
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
-from stiction_ros.signals.autoregression import whiten
+from stiction_ros.signals.autoregression import companion, whiten
 
 QUICK = GapOptions(quick=True)
 
@@ -243,11 +245,32 @@ def test_a_rounded_op_is_no_disturbance() -> None:
     assert not answer.noise[0].disagrees
 
 
-def test_no_predictions_are_steady_that_never_forget() -> None:
-    """A load that walks into a level wanders as noise of its equation does, for ever."""
-    level = np.array([[1.7018108, 1.0], [-0.7018108, 0.0]])
-    a, c = block_diag(level, level, 1.0), np.array([1.0, 0.0, 1.0, 0.0, 0.0])
-    a[2:4, 4] = 0.00257384, 0.00228754
-    for size in np.logspace(-5, -3, 100):
-        found = steady_gain(a, np.diag([1.0, 0.0, 0.0, 0.0, size]), c, 0.001)
-        assert found is None or np.abs(np.linalg.eigvals(a - np.outer(found[0], c))).max() < 1.0
+@pytest.mark.parametrize("keeps", [1.0, 1.0005, 1.01])
+def test_a_load_that_walks_into_a_level_is_foretold_steadily(keeps: float) -> None:
+    """Noise of its equation wanders for ever as well: nothing tells the two levels apart."""
+    level = np.array([[keeps + 0.7018108, 1.0], [-0.7018108 * keeps, 0.0]])
+    walked = block_diag(level, 1.0)
+    walked[:2, 2] = 0.00257384, 0.00228754
+    a, c = block_diag(level, walked), np.array([1.0, 0.0, 1.0, 0.0, 0.0])
+    q = np.stack([np.diag([1.0, 0.0, 0.0, 0.0, size]) for size in np.logspace(-5, -3, 100)])
+    gains, missed = steady_gain(np.stack([a] * len(q)), q, c, 0.001)
+    assert np.all((missed > 1.0) & (missed < 1.01))
+    for gain in gains:
+        assert np.abs(np.linalg.eigvals(a - np.outer(gain, c))).max() < keeps + 1e-6
+
+
+@given(
+    poles=st.lists(st.floats(-0.9, 0.95), min_size=1, max_size=4),
+    seed=st.integers(0, 100),
+    r=st.floats(1e-3, 10.0),
+)
+def test_the_steady_gain_is_that_of_the_riccati_equation(
+    poles: list[float], seed: int, r: float
+) -> None:
+    a, random = companion(-np.poly(poles)[1:]), np.random.default_rng(seed)
+    root, c = random.normal(size=(2, len(a), len(a))), random.normal(size=len(a))
+    q = root[0] @ root[0].T
+    (gain,), (missed,) = steady_gain(a[None], q[None], c, r)
+    p = solve_discrete_are(a.T, c[:, None], q, np.array([[r]]))
+    assert missed == pytest.approx(c @ p @ c + r, rel=1e-6)
+    assert gain == pytest.approx(a @ p @ c / missed, rel=1e-6, abs=1e-9)
