@@ -68,12 +68,12 @@ def same_thing(task: Task, changes: Sequence[ProcessChange], effects: Sequence[s
 
     A model that is a little off is so in several figures; one alone is what an effect says. Of
     another gain the looks have judged already, beside a curve of the valve. Up to half a sample
-    of dead time less may be a scan between two samples, where no law shows that there is none.
+    of dead time may be a scan between two samples, where no law shows whether there is one.
     """
     whats = {change.what for change in changes}
     half = MAJORITY * task.runs.sample_time
-    earlier = whats == {DELAY} and all(-half < change.value < 0.0 for change in changes)
-    if earlier and in_doubt(task.runs, task.controller):
+    little = whats == {DELAY} and all(abs(change.value) < half for change in changes)
+    if little and in_doubt(task.runs, task.controller):
         return True
     return whats == {GAIN} or (len(whats) == 1 and whats <= set(effects))
 
