@@ -88,10 +88,6 @@ def decide(
         reason = "the held-out rows do not confirm it" if passed else "nothing beats no effect"
         return Decision(GapVerdict.NONE, None, (), False, reason)
     best = kept[0]
-    small = [f for f in ranked if _too_small(f) and confirmed(f)]
-    if small and small[0].evidence > best.evidence + margin:
-        reason = f"{small[0].candidate.name} explains most of it, and is too small to matter"
-        return Decision(GapVerdict.NONE, None, (), False, reason)
     if lent is not None and lent.evidence > best.evidence + margin:
         reason = f"the held-out rows do not confirm {lent.candidate.name}, which gains most"
         return Decision(GapVerdict.UNKNOWN, None, (), False, reason, lent)
@@ -149,11 +145,9 @@ def borne_out(delta_bic: float, held_gain: float, dated: bool) -> bool:
 
 def large_enough(fit: CandidateFit) -> bool:
     """Tell whether an effect has an engineering size, inside of what was searched."""
-    return not fit.candidate.at_bound(fit.point) and not _too_small(fit)
-
-
-def _too_small(fit: CandidateFit) -> bool:
-    return fit.candidate.inside and not fit.candidate.large_enough(fit.point, fit.factors)
+    if fit.candidate.at_bound(fit.point):
+        return False
+    return fit.candidate.large_enough(fit.point, fit.factors)
 
 
 def on_the_way(place: str, effect: str) -> bool:

@@ -57,6 +57,8 @@ class ProcessChange:
     interval: tuple[float, float]  # 95 %
     unit: str  # of the value
     model: float | None = None  # the model's own time constant, s; None for the others
+    # whether it is as large as matters: 5 %, or half a sample, as dead times are whole samples
+    matters: bool = True
 
     @property
     def sentence(self) -> str:
@@ -79,7 +81,9 @@ class ProcessChange:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of ``process_changes`` in ``gap --json``."""
-        return dataclasses.asdict(self) | {"interval": list(self.interval)}
+        told = dataclasses.asdict(self) | {"interval": list(self.interval)}
+        del told["matters"]  # or it is not told
+        return told
 
 
 @dataclasses.dataclass(frozen=True)

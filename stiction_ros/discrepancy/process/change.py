@@ -17,12 +17,14 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.least_squares import left_by
 from stiction_ros.discrepancy.measures import (
     GAUSS_NEWTON,
+    MAJORITY,
     MARGIN,
     NEARLY_ALL,
     NEGLIGIBLE,
     NORMAL,
     PROBE,
     ROUNDING,
+    SLIGHT,
 )
 from stiction_ros.discrepancy.simulation.equation import GAIN, Changeable, with_equation
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
@@ -267,7 +269,7 @@ class _Search:
             late = own.what == "delay"
             value, low, high = (step * ends if late else np.maximum(1.0 + ends, 0.0)).tolist()
             model = None if own.lasts is None else own.lasts * step
-            found.append(
-                ProcessChange(name, own.what, value, (low, high), "s" if late else "1", model)
-            )
+            matters = abs(float(self.values[k])) >= (MAJORITY if late else SLIGHT)
+            unit = "s" if late else "1"
+            found.append(ProcessChange(name, own.what, value, (low, high), unit, model, matters))
         return found

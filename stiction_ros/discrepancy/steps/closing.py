@@ -40,7 +40,7 @@ from stiction_ros.discrepancy.gap.measure import (
 )
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.measures import SLIGHT
+from stiction_ros.discrepancy.measures import MAJORITY, SLIGHT
 from stiction_ros.discrepancy.process.change import open_figures
 from stiction_ros.discrepancy.steps.look import explained
 from stiction_ros.discrepancy.steps.settle import settle
@@ -79,10 +79,11 @@ def closing(task: Task, looked: State) -> Discrepancy:
     no_names = [
         called(*e.fit.candidate.key) for e in looked.now.effects if e.fit.candidate.key not in kept
     ]
+    changes = tuple(change for change in state.now.changes if change.matters)
     silent = not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE)
     if silent and no_names:
         verdict = GapVerdict.UNKNOWN
-    elif silent and state.now.changes:
+    elif silent and changes:
         verdict = GapVerdict.NAMED
     told = {name for each in effects for name in each.standing.names} | {*alternatives}
     task.report(1.0)
@@ -95,7 +96,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
         where=_where(task, state, noises, no_names, verdict),
         untestable=tuple(t for t in testable if not t.testable and (t.place, t.effect) not in told),
         noise=noises,
-        process_changes=state.now.changes,
+        process_changes=changes,
         before=before,
         after=after,
         closed=closed_share(before, after) if state.now.effects or state.now.changes else 0.0,
@@ -136,6 +137,11 @@ def _where(
     last = state.looks[-1].decision
     if last.verdict is GapVerdict.UNKNOWN:
         found.append(last.reason)
+    found += [
+        f"{each.output}: {each.sentence}; the model is corrected, it is too small to matter"
+        for each in state.now.changes
+        if not each.matters
+    ]
     found += [f"{each} would fit, but closes next to nothing of the gap" for each in no_names]
     return tuple(found)
 
@@ -228,14 +234,12 @@ def _worth(task: Task, state: State, louder: list[FoundEffect]) -> float:
 def _louder(task: Task, state: State) -> list[FoundEffect]:
     """Return the noise beyond the declared one as effects.
 
-    No valve and no plant obeys its law to the letter: beside an effect on the way from OP to PV
-    what a law misses wanders as a noise does, and is said without a name. So does what an OP
-    misses that is drawn in between the samples.
+    What an OP misses that is drawn in between the samples wanders as a noise does, and is said
+    without a name.
     """
     found: list[FoundEffect] = []
     now, base = state.now, state.now.base
-    on_way = any(on_the_way(each.place, each.effect) for each in now.effects)
-    if on_way or not now.runs.scans_told:
+    if not now.runs.scans_told:
         return found
     for i, declared in enumerate(declared_noise(base.run.model)):
         fit = base.noise[i]
@@ -267,16 +271,19 @@ def _stranger(state: State, law: NoiseEffect) -> float:
 def _matters(state: State, output: int) -> bool:
     """Tell whether what is left of an output is large enough to be an effect.
 
-    A model of the field is never exact: beside a large effect it leaves a little of its own.
-    Rounding of a slow signal is no white noise: within a few steps no law of the noise is told.
+    No valve and no plant obeys its law to the letter: beside an effect on the way from OP to PV it
+    has to be most of the gap, as what a law misses wanders as a noise does. Beside another large
+    effect a model leaves a little of its own. Rounding of a slow signal is no white noise: within a
+    few steps no law of the noise is told.
     """
     now = state.now
     rows = now.base.blocks[output].train
     before, after = (
         float(np.std(base.noise[output].residual[rows])) for base in (state.before, now.base)
     )
-    alone = not (now.effects or now.changes)
-    return after >= SOME_STEPS * now.runs.quanta[output] and (alone or after > MATTERS * before)
+    on_way = any(on_the_way(each.place, each.effect) for each in now.effects)
+    least = math.sqrt(MAJORITY) if on_way else MATTERS if now.effects or now.changes else 0.0
+    return after >= SOME_STEPS * now.runs.quanta[output] and after > least * before
 
 
 def _provenance(task: Task, effect: FoundEffect) -> dict[str, object]:

@@ -4,15 +4,14 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 
-from stiction_ros.discrepancy.data.controller_check import in_doubt
 from stiction_ros.discrepancy.decision.decide import large_enough
 from stiction_ros.discrepancy.decision.explanation import AddedEffect, Explanation, ProcessChange
 from stiction_ros.discrepancy.decision.scores import Scores
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.measures import MAJORITY, NEGLIGIBLE, TRIED
+from stiction_ros.discrepancy.measures import NEGLIGIBLE, TRIED
 from stiction_ros.discrepancy.process.change import changed_process
-from stiction_ros.discrepancy.simulation.equation import DELAY, GAIN
+from stiction_ros.discrepancy.simulation.equation import GAIN
 from stiction_ros.discrepancy.steps.state import State, Task
 
 
@@ -63,18 +62,16 @@ def _best(task: Task, found: Sequence[Explanation | None]) -> Explanation | None
     return min(whole, key=lambda each: each.worth(task.options.margin), default=None)
 
 
-def same_thing(task: Task, changes: Sequence[ProcessChange], effects: Sequence[str]) -> bool:
+def same_thing(changes: Sequence[ProcessChange], effects: Sequence[str]) -> bool:
     """Tell whether a changed process is one effect of the process by another name.
 
     A model that is a little off is so in several figures; one alone is what an effect says. Of
-    another gain the looks have judged already, beside a curve of the valve. Up to half a sample
-    of dead time may be a scan between two samples, where no law shows whether there is one.
+    another gain the looks have judged already, beside a curve of the valve. What is too little to
+    matter is no effect.
     """
     whats = {change.what for change in changes}
-    half = MAJORITY * task.runs.sample_time
-    little = whats == {DELAY} and all(abs(change.value) < half for change in changes)
-    if little and in_doubt(task.runs, task.controller):
-        return True
+    if not any(change.matters for change in changes):
+        return False
     return whats == {GAIN} or (len(whats) == 1 and whats <= set(effects))
 
 
@@ -98,7 +95,7 @@ def mended(task: Task, state: State) -> State | None:
         return None
     names = [each.effect for each in added] or _left_in_doubt(state)
     beside = bool(found.effects) and not added  # no look has judged a gain beside these effects
-    if not beside and same_thing(task, found.changes, names):
+    if not beside and same_thing(found.changes, names):
         return None
     # Where no effect was in the model, the looks have to find it.
     other = found if added else found.holding(())
@@ -120,14 +117,14 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
     found = with_process(task, state, state.now.effects)
     if found is None:
         return None
-    inside = [fit for fit in scores.fits if fit.candidate.inside and fit.evidence > 0.0]
-    gained = max((fit.evidence for fit in inside), default=0.0)
+    named = [fit for fit in scores.fits if fit.candidate.inside and large_enough(fit)]
+    gained = max([0.0, *(fit.evidence for fit in named)])
     explained = state.now.worth(margin) - found.worth(margin)
     if state.now.effects:  # as of each further effect
         explained -= share_of_all(state.now, state.now.holding(()))
     near = min(gained, explained - margin)
-    rivals = [fit.candidate.effect for fit in inside if fit.evidence >= near]
-    if explained <= gained or same_thing(task, found.changes, rivals):
+    rivals = [fit.candidate.effect for fit in named if fit.evidence >= max(near, 0.0)]
+    if explained <= gained or same_thing(found.changes, rivals):
         return None
     return dataclasses.replace(state, now=found)
 
