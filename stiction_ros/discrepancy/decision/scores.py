@@ -45,10 +45,8 @@ def all_candidates(base: Baseline, clock_known: bool = False) -> tuple[Candidate
         clock_known: whether the record's clock is shown to be right, so that a longer delay
             is no shift of the record.
     """
-    pairs = [(n, b.scored) for n, b in zip(base.noise, base.blocks, strict=True)]
-    # the first rows tell nothing, and a fast plant's state may be any number there
-    gap = np.column_stack([np.where(scored, noise.residual, 0.0) for noise, scored in pairs])
-    whitened = [np.where(scored, noise.innovations, 0.0) for noise, scored in pairs]
+    gap = np.column_stack([base.scored(i, noise.residual) for i, noise in enumerate(base.noise)])
+    whitened = [base.scored(i, noise.innovations) for i, noise in enumerate(base.noise)]
     found = valve_candidates(base.run) + output_candidates(base.run)
     found += disturbance_candidates(base.run, gap, whitened)
     found += plugged_candidates(base.run, whitened)

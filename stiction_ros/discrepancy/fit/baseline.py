@@ -104,6 +104,13 @@ class Baseline:
             found.append(forms[0] if forms else np.zeros(0))
         return tuple(found)
 
+    def scored(self, output: int, values: FloatArray) -> FloatArray:
+        """Return values of an output, shape (N,), 0 where they are not scored.
+
+        The first rows tell nothing, and a fast plant's state may be any number there.
+        """
+        return np.where(self.blocks[output].scored, values, 0.0)
+
     @property
     def bic(self) -> float:
         """BIC of the current model, but for what every candidate shares with it."""

@@ -108,8 +108,7 @@ def _change(residual: FloatArray, scored: BoolArray) -> tuple[int, float]:
 
 def _line(base: Baseline, output: int) -> tuple[float, float]:
     """Return the strongest period of the gap in seconds and its share of the variance."""
-    values = np.where(base.blocks[output].scored, base.noise[output].residual, 0.0)
-    part = values[base.run.runs.longest]
+    part = base.scored(output, base.noise[output].residual)[base.run.runs.longest]
     part = part - part.mean()
     power = np.abs(np.fft.rfft(part * np.hanning(len(part)))) ** 2
     power[:2] = 0.0

@@ -11,13 +11,11 @@ from scipy.linalg import block_diag, solve_toeplitz
 
 from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.likelihood.slow_noise import REMEMBERED, counting
-from stiction_ros.discrepancy.measures import NEGLIGIBLE, ROUNDING, TRACE
+from stiction_ros.discrepancy.measures import NEGLIGIBLE, ROUNDING, STEPS, TRACE
 from stiction_ros.effects import ColouredDisturbance, FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess, NoiseEntry, Process
 from stiction_ros.signals.autoregression import companion
-
-DOUBLINGS = 20  # of the samples of a prediction: no record is longer
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,15 +94,26 @@ def rounded(noise: DeclaredNoise, quantum: float) -> DeclaredNoise:
     count, white = len(noise.ar), quantum**2 / 12.0
     if not count or white * (1.0 + float(noise.ar @ noise.ar)) < TRACE * noise.std**2:
         return noise
-    driven, look = np.zeros((count, count)), np.eye(count)[0]
-    driven[0, 0] = 1.0
-    white /= noise.std**2
-    (gain,), (missed,) = steady_gain(companion(noise.ar)[None], driven[None], look, white)
-    moving = np.concatenate([[1.0], gain - noise.ar])  # of the innovations, over A
-    inverse = np.asarray(lfilter([1.0], moving, np.eye(1, REMEMBERED)[0]))
-    last = int(np.max(np.flatnonzero(np.abs(inverse) > NEGLIGIBLE))) + 1
-    whitening = np.convolve(np.concatenate([[1.0], -noise.ar]), inverse[:last])
-    return DeclaredNoise(noise.std * float(np.sqrt(missed)), -whitening[1:])
+    look = np.eye(count)[0]
+    driven = noise.std**2 * np.outer(look, look)
+    return _whitened(companion(noise.ar), driven, look, white)
+
+
+def _whitened(
+    states: FloatArray, driven: FloatArray, look: FloatArray, white: float
+) -> DeclaredNoise:
+    """Return the noise of states that one output sees beside a white one, as an autoregression.
+
+    Args:
+        states: their matrix, shape (n, n).
+        driven: what is added to their covariance in a sample, shape (n, n).
+        look: what is seen of them, shape (n,).
+        white: variance of the white one.
+    """
+    (gain,), (missed,) = steady_gain(states[None], driven[None], look, white)
+    over, under = (np.real(np.poly(each)) for each in (states, states - np.outer(gain, look)))
+    inverse = counting(np.asarray(lfilter([1.0], under, np.eye(1, REMEMBERED)[0])))
+    return DeclaredNoise(float(np.sqrt(missed)), -np.convolve(over, inverse)[1:])
 
 
 def behind_lag(ar: FloatArray, keep: float) -> FloatArray:
@@ -169,21 +178,17 @@ def beside_unseen(
     equations = arx_equations(model.process)
     if equations is None:
         return None
-    passed, driven, shown = _of_op(equations[output], model, unseen)
-    white = quantum**2 / 12.0 + (0.0 if len(noise.ar) else noise.std**2)
-    own = companion(noise.ar)
-    excited = np.zeros(own.shape)
-    if len(own):
-        excited[0, 0] = noise.std**2
-    states, moved = block_diag(own, passed), block_diag(excited, driven)
-    look = np.concatenate([np.eye(1, len(own))[0], shown])
-    white = max(white, TRACE * noise.std**2)
-    (gain,), (missed,) = steady_gain(states[None], moved[None], look, white)
-    whitening, kept, state = np.zeros(REMEMBERED), states - np.outer(gain, look), gain.copy()
-    for lag in range(REMEMBERED):
-        whitening[lag] = look @ state
-        state = kept @ state
-    found = DeclaredNoise(float(np.sqrt(missed)), counting(whitening))
+    states, driven, look = _of_op(equations[output], model, unseen)
+    white = quantum**2 / 12.0
+    if np.array_equal(noise.ar, -np.asarray(equations[output].a)):  # it passes the same poles
+        driven[0, 0] += noise.std**2
+    elif len(noise.ar):
+        own, first = companion(noise.ar), np.eye(len(noise.ar))[0]
+        driven = block_diag(noise.std**2 * np.outer(first, first), driven)
+        states, look = block_diag(own, states), np.concatenate([first, look])
+    else:
+        white += noise.std**2
+    found = _whitened(states, driven, look, max(white, TRACE * noise.std**2))
     return None if _alike(found, noise) else found
 
 
@@ -239,7 +244,7 @@ def steady_gain(
     """
     eye, moves, p = np.eye(len(c)), np.swapaxes(a, 1, 2), q
     told = np.broadcast_to(np.outer(c, c) / r, a.shape)
-    for _ in range(DOUBLINGS):
+    for _ in range(STEPS):
         now = np.linalg.solve(eye + told @ p, np.concatenate([moves, told], axis=2))
         on, across = now[:, :, : len(c)], now[:, :, len(c) :]
         back = np.swapaxes(moves, 1, 2)

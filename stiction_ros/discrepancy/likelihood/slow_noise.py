@@ -3,7 +3,7 @@
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.discrepancy.measures import GAUSS_NEWTON, NEGLIGIBLE
+from stiction_ros.discrepancy.measures import NEGLIGIBLE, STEPS
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 REMEMBERED = 60  # samples that such a noise, or an OP off its record, is remembered
@@ -44,7 +44,7 @@ def _searched(
     most = 1.0 - 1.0 / len(residual)  # of either pole: a walk that goes on for all samples
     share = 1.0
     step = np.zeros(2)
-    for _ in range(GAUSS_NEWTON):
+    for _ in range(STEPS):
         left = total = 0.0
         slope, cross, gram = np.zeros(2), np.zeros(2), np.zeros((2, 2))
         for k in range(1, len(residual)):

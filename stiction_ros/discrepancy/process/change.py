@@ -15,8 +15,8 @@ from stiction_ros.discrepancy.decision.explanation import (
 )
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.least_squares import left_by
+from stiction_ros.discrepancy.likelihood.noise import NoiseFit
 from stiction_ros.discrepancy.measures import (
-    GAUSS_NEWTON,
     MAJORITY,
     MARGIN,
     NEARLY_ALL,
@@ -25,6 +25,7 @@ from stiction_ros.discrepancy.measures import (
     PROBE,
     ROUNDING,
     SLIGHT,
+    STEPS,
 )
 from stiction_ros.discrepancy.simulation.equation import GAIN, Changeable, with_equation
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
@@ -156,10 +157,8 @@ class _Search:
         """Return the figures as they are, after the BIC that they leave, several by the margin."""
         run = self._run(self.values)
         base = Baseline.of(run, columns=open_columns(run, self.effects))
-        given = self.declared and base.declared[self.output]
-        noise = base.under_declared(self.output) if given else base.noise[self.output]
         count = int(self.free.sum())
-        score = noise.bic(count) + (MARGIN if count > 1 else 0.0)
+        score = self._noise(base).bic(count) + (MARGIN if count > 1 else 0.0)
         return score, self.free.copy(), self.values.copy(), self.errors.copy(), self.effects
 
     def _eliminate(self) -> bool:
@@ -181,44 +180,56 @@ class _Search:
         return False
 
     def _settle(self) -> None:
-        output, free = self.output, self.free
-        least, moved = np.inf, np.zeros(len(free))
-        for _ in range(GAUSS_NEWTON):
+        """Step all free figures, and those of smooth effects, until they settle."""
+        free, least = self.free, np.inf
+        count = int(free.sum())
+        best, step = (self.values, self.effects), np.zeros(count + len(self.smooth))
+        for _ in range(STEPS):
             run = self._run(self.values)
             base = Baseline.of(run, columns=open_columns(run, self.effects))
-            noise, train = base.noise[output], base.blocks[output].train
-            given = self.declared and base.declared[output]
-            ar = base.declared[output][0] if given else noise.ar
-            gap = run.gap[:, output]
-            basis = base.basis(output, ar)
-            target = left_by(basis, whiten(gap, ar)[train])
-            size = float(target @ target)
-            if given and size > least:  # the last step was too long
-                moved *= 0.5
-                self.values = self.values - moved
-                continue
-            least = size
-            white = left_by(basis, whiten(self._slopes(run, gap), ar)[train])
-            step, *_ = np.linalg.lstsq(white, -target, rcond=1e-8)
-            left = target + white @ step
-            told = base.blocks[output].measured * (len(left) - len(step))
-            variance = float(left @ left) / max(told, 1.0)
-            spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(white.T @ white)) * variance, 0.0))
-            seen = np.linalg.norm(white, axis=0) > ROUNDING * np.linalg.norm(target)
-            seen &= spread > 0.0
-            count = int(free.sum())
-            self.errors[free] = np.where(seen, spread, np.inf)[:count]
+            noise = self._noise(base)
+            if noise.bic(0) > least:  # the last step was too long
+                step = 0.5 * step
+            else:
+                least, best = noise.bic(0), (self.values, self.effects)
+                step = self._bounded(self._step(run, base, noise.ar))
+            self.values, self.effects = best
             moved = np.zeros(len(free))
-            room = 0.5 * np.where(step[:count] < 0.0, -self.least[free], self.most[free])
-            own = np.where(room > 0.0, step[:count], 0.0)
-            moved[free] = own / max(float(np.max(np.abs(own) / np.maximum(room, ROUNDING))), 1.0)
-            moved = np.clip(self.values + moved, self.least, self.most) - self.values
-            self.values = self.values + moved
-            more = np.clip(step[count:], -LARGEST_STEP, LARGEST_STEP).tolist()
-            for k, each in zip(self.smooth, more, strict=True):
+            moved[free] = step[:count]
+            self.values = np.clip(self.values + moved, self.least, self.most)
+            for k, each in zip(self.smooth, step[count:].tolist(), strict=True):
                 self.effects = self._with_stepped(k, each)
-            if np.all(np.abs([*moved, *more]) < NEGLIGIBLE * PROBE):
+            if np.all(np.abs(step) < NEGLIGIBLE * PROBE):
                 break
+
+    def _noise(self, base: Baseline) -> NoiseFit:
+        """Return the declared noise, where it is to be kept, or the one that explains most."""
+        given = self.declared and base.declared[self.output]
+        return base.under_declared(self.output) if given else base.noise[self.output]
+
+    def _step(self, run: FreeRun, base: Baseline, ar: FloatArray) -> FloatArray:
+        """Return Gauss-Newton's step of all that is free, and set the standard errors."""
+        train, gap = base.blocks[self.output].train, run.gap[:, self.output]
+        basis = base.basis(self.output, ar)
+        target = left_by(basis, whiten(gap, ar)[train])
+        white = left_by(basis, whiten(self._slopes(run, gap), ar)[train])
+        step, *_ = np.linalg.lstsq(white, -target, rcond=1e-8)
+        left = target + white @ step
+        told = base.blocks[self.output].measured * (len(left) - len(step))
+        variance = float(left @ left) / max(told, 1.0)
+        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(white.T @ white)) * variance, 0.0))
+        seen = np.linalg.norm(white, axis=0) > ROUNDING * np.linalg.norm(target)
+        seen &= spread > 0.0
+        self.errors[self.free] = np.where(seen, spread, np.inf)[: int(self.free.sum())]
+        return np.asarray(step)
+
+    def _bounded(self, step: FloatArray) -> FloatArray:
+        """Return a step of which no figure goes more than half the way to its bound."""
+        free, count = self.free, int(self.free.sum())
+        room = 0.5 * np.where(step[:count] < 0.0, -self.least[free], self.most[free])
+        own = np.where(room > 0.0, step[:count], 0.0)
+        own /= max(float(np.max(np.abs(own) / np.maximum(room, ROUNDING))), 1.0)
+        return np.concatenate([own, np.clip(step[count:], -LARGEST_STEP, LARGEST_STEP)])
 
     def slopes(self) -> FloatArray:
         """Return what a unit of every free figure moves, shape (N, figures)."""
