@@ -64,9 +64,7 @@ class ControllerCheck:
 NOT_ASKED = ControllerCheck(ControllerStatus.NOT_ASKED, None, 1.0, False)
 
 
-def unseen_of(
-    runs: Runs, check: ControllerCheck, *, drawn_in: bool = False
-) -> tuple[tuple[Unseen, ...], ...]:
+def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], ...]:
     """Return per valve what may act beside the recorded OP.
 
     A rounded OP is off by up to half a step: by another amount at each sample where it moves at
@@ -79,9 +77,8 @@ def unseen_of(
     Args:
         runs: the records.
         check: of the controller.
-        drawn_in: whether OP is drawn in between the samples, as the loop shows a second scan.
     """
-    asked = in_doubt(runs, check)
+    asked = _in_doubt(runs, check)
     found = []
     for op in runs.op.T:
         moves = np.concatenate([np.diff(op[rows]) for rows in runs.slices])
@@ -90,8 +87,7 @@ def unseen_of(
         keep = 1.0 - often if often <= MANY else _kept(op, runs.slices)
         beside = [Unseen(quantum**2 / 12.0, keep)] if quantum > 0.0 else []
         beside += [] if check.unsure is None else [check.unsure]
-        # where OP rests more often, and the loop shows no scan between samples, there is none
-        if asked and (drawn_in or often > NEARLY_ALL):
+        if asked and often > NEARLY_ALL:  # where OP rests more often there is no such scan
             bends = np.concatenate([0.5 * np.diff(op[rows], 2) for rows in runs.slices])
             spread = NORMAL_OF_MEDIAN * float(np.median(np.abs(bends)))
             beside.append(Unseen((0.5 * spread) ** 2))  # it is held for half a sample
@@ -99,7 +95,7 @@ def unseen_of(
     return tuple(found)
 
 
-def in_doubt(runs: Runs, check: ControllerCheck) -> bool:
+def _in_doubt(runs: Runs, check: ControllerCheck) -> bool:
     """Tell whether a controller may have scanned again between samples, which no law shows."""
     untold = any(record.sp is None for record in runs.records)
     given = check.status in (ControllerStatus.NOT_ASKED, ControllerStatus.OTHER) and not untold

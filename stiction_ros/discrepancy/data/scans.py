@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.likelihood.declared_noise import Unseen
 from stiction_ros.discrepancy.measures import OUTLYING, TURNS
 from stiction_ros.discrepancy.simulation.free_run import FEWEST, Runs
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
@@ -33,21 +32,6 @@ class Scans:
         """Return the OPs of both scans of each sample, shape (2 N, 1), the recorded one first."""
         both = np.stack([recorded, 2.0 * self.op - recorded], axis=1)
         return np.asarray(both.reshape(-1, recorded.shape[1]))
-
-
-def drawn_in(runs: Runs, unseen: tuple[tuple[Unseen, ...], ...]) -> Runs:
-    """Return records with a second scan in each sample, on a cubic through the four about it.
-
-    Args:
-        runs: whose OP between two samples no law tells.
-        unseen: per valve what may act beside it then.
-    """
-    second = runs.op.copy()
-    for rows in runs.slices:
-        second[rows][:-1] = between_samples(runs.op[rows])
-    scans = np.stack([runs.op, second], axis=1).reshape(-1, runs.op.shape[1])
-    mean = 0.5 * (runs.op + second)
-    return dataclasses.replace(runs, op=mean, scans=scans, scans_told=False, unseen=unseen)
 
 
 def scanned_twice(model: LoopModel, runs: Runs) -> Scans | None:

@@ -57,8 +57,6 @@ class Runs:
     # OP at the two scans of each sample, shape (2 N, m), %; a stem slips by either. None where a
     # sample holds one OP
     scans: FloatArray | None = None
-    # whether a law of the controller tells these scans; else they are drawn in between the samples
-    scans_told: bool = True
     # of the blocks of each record that are kept back, each of ``PHASES``; by turns where none are
     # given
     phases: tuple[int, ...] = ()
@@ -281,9 +279,7 @@ class FreeRun:
         within = [
             self._within(output, j)
             for j in range(len(self.model.valves))
-            if self.runs.scans is not None
-            and self.runs.scans_told
-            and self.responses.reaches(output, j)
+            if self.runs.scans is not None and self.responses.reaches(output, j)
         ]
         return np.column_stack([block_diag(*blocks), *left_open(self, output), *within])
 

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import toeplitz
 
-from stiction_ros.discrepancy.data.controller_check import check_controller, in_doubt, unseen_of
+from stiction_ros.discrepancy.data.controller_check import check_controller, unseen_of
 from stiction_ros.discrepancy.data.gate import DataFinding, open_gate
-from stiction_ros.discrepancy.data.scans import drawn_in
 from stiction_ros.discrepancy.decision.explanation import Explanation
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
@@ -19,9 +18,7 @@ from stiction_ros.discrepancy.measures import MARGIN, NEARLY_ALL, SLIGHT, SURPRI
 from stiction_ros.discrepancy.process.first_model import liveliest_parts
 from stiction_ros.discrepancy.simulation.between import moves_on
 from stiction_ros.discrepancy.simulation.free_run import PHASES, FreeRun, Runs
-from stiction_ros.discrepancy.steps.look import scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import with_process
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.loop import LoopModel
@@ -64,32 +61,7 @@ def begin(
         report=progress or (lambda share: None),
         begun=begun,
     )
-    state = State(given=bare, before=base, now=Explanation(bare, base))
-    asked = in_doubt(runs, controller) and not options.process_fitted
-    return _scanned(task, state) if asked else (task, state)
-
-
-def _scanned(task: Task, state: State) -> tuple[Task, State]:
-    """Return the records with a second scan in each sample, where the loop shows it.
-
-    No law of the controller tells it there; all that may be found has to explain more by it.
-    """
-    unseen = unseen_of(task.runs, task.controller, drawn_in=True)
-    twice = dataclasses.replace(task, runs=drawn_in(task.runs, unseen))
-    base = Baseline.of(FreeRun(task.model, twice.runs))
-    other = dataclasses.replace(state, before=base, now=Explanation(state.given, base))
-    if base.score > state.before.score:
-        return task, state
-    gained = _least(task, state) - _least(twice, other)
-    return (twice, other) if gained > task.options.margin else (task, state)
-
-
-def _least(task: Task, state: State) -> float:
-    """Return the worth of no change of the model, of one effect or another process, if better."""
-    margin, process = task.options.margin, with_process(task, state, ())
-    gained = [f.evidence - margin for f in scored_by(task, state, 0).fits if f.candidate.inside]
-    least = state.before.score - max(0.0, *gained)
-    return least if process is None else min(least, process.worth(margin))
+    return task, State(given=bare, before=base, now=Explanation(bare, base))
 
 
 def _between(model: LoopModel) -> tuple[bool, ...]:

@@ -232,15 +232,9 @@ def _worth(task: Task, state: State, louder: list[FoundEffect]) -> float:
 
 
 def _louder(task: Task, state: State) -> list[FoundEffect]:
-    """Return the noise beyond the declared one as effects.
-
-    What an OP misses that is drawn in between the samples wanders as a noise does, and is said
-    without a name.
-    """
+    """Return the noise beyond the declared one as effects."""
     found: list[FoundEffect] = []
     now, base = state.now, state.now.base
-    if not now.runs.scans_told:
-        return found
     for i, declared in enumerate(declared_noise(base.run.model)):
         fit = base.noise[i]
         if declared is None or not fit.enlarged or not _matters(state, i):

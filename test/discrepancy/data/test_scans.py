@@ -9,7 +9,7 @@ from gap_loops import loop, record, without_controller, without_set_points
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate, valve_candidates
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus, check_controller
 from stiction_ros.discrepancy.data.gate import open_gate
-from stiction_ros.discrepancy.data.scans import drawn_in, scanned_twice
+from stiction_ros.discrepancy.data.scans import scanned_twice
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray, HeStiction
 from stiction_ros.loop import LoopModel, PiTuning
@@ -75,18 +75,6 @@ def test_without_set_points_the_op_between_two_samples_is_told_too() -> None:
     away, naive = check.scans.op[:-1, 0] - mean[:-1], runs.op[:-1, 0] - mean[:-1]
     assert np.std(away) < 0.2 * np.std(naive)
     assert check.unsure is not None
-
-
-def test_a_scan_that_no_law_tells_is_drawn_in() -> None:
-    runs, _, _ = thinned()
-    wave = 50.0 + 10.0 * np.sin(0.1 * np.arange(2 * len(runs)))[:, None]
-    drawn = drawn_in(dataclasses.replace(runs, op=wave[::2]), ())
-    assert drawn.scans is not None
-    assert not drawn.scans_told
-    assert drawn.scans[2:-4] == pytest.approx(wave[2:-4], abs=1e-2)
-    assert drawn.op[1:-2, 0] == pytest.approx(
-        wave[:, 0].reshape(-1, 2).mean(axis=1)[1:-2], abs=1e-2
-    )
 
 
 def test_its_recorded_tuning_is_no_other_one() -> None:
