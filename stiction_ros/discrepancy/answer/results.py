@@ -110,7 +110,7 @@ class Discrepancy:
         where: sentences that say where the gap is.
         untestable: effects that these records could not show.
         noise: per output the declared and the found noise.
-        process_changes: what of the given process had to be changed.
+        process_changes: what of the given process had to be changed, as far as it matters.
         before, after: gap per output on held-out rows.
         closed: share of the free-run excess over the noise floor that is gone.
         model_before, model_after: the loop models.

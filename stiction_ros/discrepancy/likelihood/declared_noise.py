@@ -104,6 +104,8 @@ def _whitened(
 ) -> DeclaredNoise:
     """Return the noise of states that one output sees beside a white one, as an autoregression.
 
+    Its last term stands for all that are left out, so that a level is forgotten as it should be.
+
     Args:
         states: their matrix, shape (n, n).
         driven: what is added to their covariance in a sample, shape (n, n).
@@ -112,8 +114,9 @@ def _whitened(
     """
     (gain,), (missed,) = steady_gain(states[None], driven[None], look, white)
     over, under = (np.real(np.poly(each)) for each in (states, states - np.outer(gain, look)))
-    inverse = counting(np.asarray(lfilter([1.0], under, np.eye(1, REMEMBERED)[0])))
-    return DeclaredNoise(float(np.sqrt(missed)), -np.convolve(over, inverse)[1:])
+    ar = counting(-np.asarray(lfilter(over, under, np.eye(1, REMEMBERED + 1)[0]))[1:])
+    ar[-1:] += 1.0 - over.sum() / under.sum() - ar.sum()
+    return DeclaredNoise(float(np.sqrt(missed)), ar)
 
 
 def behind_lag(ar: FloatArray, keep: float) -> FloatArray:
