@@ -38,8 +38,8 @@ def scanned_twice(model: LoopModel, runs: Runs) -> Scans | None:
     """Return the law of a controller that scans twice in a sample; None where none is seen.
 
     Its error between two samples has to lie about those of its neighbours as PV itself does about
-    its own, by the recorded tuning or by the one that gives the moves of OP best. A law that scans
-    once leaves nothing there but rounding.
+    its own, by the recorded tuning or by the one that gives the moves of OP best. By a law that
+    scans once it is, but for rounding, their mean or the later one.
 
     Args:
         model: of a loop with one valve and one output.
@@ -59,7 +59,8 @@ def scanned_twice(model: LoopModel, runs: Runs) -> Scans | None:
         if integral == 0.0 or gain / integral <= 0.0:
             continue
         away = [part.away(gain, integral) for part in parts]
-        between = float(np.nanmedian(np.abs(np.concatenate(away))))
+        once = [a - 0.5 * np.diff(part.error) for part, a in zip(parts, away, strict=True)]
+        between = min(float(np.nanmedian(np.abs(np.concatenate(each)))) for each in (away, once))
         if LIKE_PV[0] * usual < between < LIKE_PV[1] * usual:
             mean = [
                 part.mean_op(a, gain, integral, (low, high))

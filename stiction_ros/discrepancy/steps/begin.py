@@ -132,14 +132,17 @@ def _alone(shocks: FloatArray, ar: FloatArray) -> BoolArray:
     """Return which readings are off where the process is not, by innovations over σ, shape (N,).
 
     One that is off by w leaves the innovations w, −φ₁ w, … behind. This has to explain more than is
-    ever chance, as much as a shock of the process, and the margin more than a shock at any of the
-    samples beside it.
+    ever chance, as much as a shock of the process or a step of PV, and the margin more than these
+    at any of the samples beside it.
 
     References:
-        I. Chang, G. C. Tiao, C. Chen, Technometrics 30 (1988) 193-204 (additive outliers).
+        C. Chen, L.-M. Liu, J. Am. Stat. Assoc. 88 (1993) 284-297 (additive outliers, level shifts).
     """
     found, least, reach = np.zeros(len(shocks), dtype=bool), np.zeros(len(shocks) + 1), len(ar) + 1
-    left, back, law = shocks**2, whiten(shocks[::-1], ar)[::-1], np.array([1.0, *-ar, 0.0])
+    back, law = whiten(shocks[::-1], ar)[::-1], np.array([1.0, *-ar, 0.0])
+    step = np.cumsum(law[:-1]) / np.linalg.norm(np.cumsum(law[:-1]))
+    stepped = np.correlate(np.pad(shocks, (0, len(ar))), step, "valid")
+    left = np.maximum(shocks**2, stepped**2)
     around = sliding_window_view(np.pad(left, reach), reach).max(axis=1)
     for count in (1, 2):
         parts, size = sliding_window_view(back, count), len(shocks) - count + 1
