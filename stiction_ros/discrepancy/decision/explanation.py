@@ -57,7 +57,7 @@ class ProcessChange:
     interval: tuple[float, float]  # 95 %
     unit: str  # of the value
     model: float | None = None  # the model's own time constant, s; None for the others
-    # whether it is as large as matters: 5 %, or half a sample, as dead times are whole samples
+    # whether it is as large as matters: 5 %, and half a sample in time, as OP is held so long
     matters: bool = True
 
     @property

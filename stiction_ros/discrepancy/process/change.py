@@ -280,7 +280,9 @@ class _Search:
             late = own.what == "delay"
             value, low, high = (step * ends if late else np.maximum(1.0 + ends, 0.0)).tolist()
             model = None if own.lasts is None else own.lasts * step
-            matters = abs(float(self.values[k])) >= (MAJORITY if late else SLIGHT)
+            size = abs(float(self.values[k]))
+            lasts = size if late else MAJORITY if own.lasts is None else size * own.lasts
+            matters = lasts >= MAJORITY and (late or size >= SLIGHT)
             unit = "s" if late else "1"
             found.append(ProcessChange(name, own.what, value, (low, high), unit, model, matters))
         return found
