@@ -87,10 +87,11 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
         keep = 1.0 - often if often <= MANY else _kept(op, runs.slices)
         beside = [Unseen(quantum**2 / 12.0, keep)] if quantum > 0.0 else []
         beside += [] if check.unsure is None else [check.unsure]
-        if asked and often > NEARLY_ALL:  # where OP rests more often there is no such scan
+        # an OP that is not rounded, and yet rests, is no controller's that scans between samples
+        if asked and often > (MANY if quantum > 0.0 else NEARLY_ALL):
             bends = np.concatenate([0.5 * np.diff(op[rows], 2) for rows in runs.slices])
-            spread = NORMAL_OF_MEDIAN * float(np.median(np.abs(bends)))
-            beside.append(Unseen((0.5 * spread) ** 2))  # it is held for half a sample
+            spread = (NORMAL_OF_MEDIAN * float(np.median(np.abs(bends)))) ** 2 - quantum**2 / 8.0
+            beside.append(Unseen(max(0.25 * spread, 0.0)))  # it is held for half a sample
         found.append(tuple(beside))
     return tuple(found)
 

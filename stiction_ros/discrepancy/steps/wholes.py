@@ -66,12 +66,12 @@ def same_thing(changes: Sequence[ProcessChange], effects: Sequence[str]) -> bool
     """Tell whether a changed process is one effect of the process by another name.
 
     A model that is a little off is so in several figures; one alone is what an effect says. Of
-    another gain the looks have judged already, beside a curve of the valve. What is too little to
+    another gain the looks have judged already, beside a curve of the valve. What is too small to
     matter is no effect.
     """
-    whats = {change.what for change in changes}
     if not any(change.matters for change in changes):
         return False
+    whats = {change.what for change in changes}
     return whats == {GAIN} or (len(whats) == 1 and whats <= set(effects))
 
 
@@ -95,7 +95,8 @@ def mended(task: Task, state: State) -> State | None:
         return None
     names = [each.effect for each in added] or _left_in_doubt(state)
     beside = bool(found.effects) and not added  # no look has judged a gain beside these effects
-    if not beside and same_thing(found.changes, names):
+    matter = any(change.matters for change in found.changes)  # else no name gives way to them
+    if not matter or (not beside and same_thing(found.changes, names)):
         return None
     # Where no effect was in the model, the looks have to find it.
     other = found if added else found.holding(())
