@@ -138,7 +138,7 @@ def _where(
     if last.verdict is GapVerdict.UNKNOWN:
         found.append(last.reason)
     found += [
-        f"{each.output}: {each.sentence}; the model is corrected, it is too small to matter"
+        f"{each.output}: {each.sentence}; this is too small to matter, and the model is corrected"
         for each in state.now.changes
         if not each.matters
     ]
