@@ -71,5 +71,7 @@ def test_a_figure_that_is_no_effect_is_named(
 def test_what_is_too_small_to_matter_is_corrected_and_no_finding() -> None:
     found = answered(loop(12.55))
     assert (found.verdict, found.effects, found.process_changes) == (GapVerdict.NONE, (), ())
-    assert any("time constant 12" in said and "too small to matter" in said for said in found.where)
+    assert any(
+        "in the model 12.5 s" in said and "too small to matter" in said for said in found.where
+    )
     assert found.model_after != found.model_before
