@@ -1,11 +1,13 @@
 """The report of a discrepancy: the gap before and after, what names the effect, the rivals."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapVerdict, Look
+from stiction_ros.discrepancy.decision.explanation import ProcessChange
 from stiction_ros.discrepancy.gap.measure import levelled
 from stiction_ros.pages.frame import framed, listed, text
 from stiction_ros.pages.plot import SCRIPT, Curve, over_time
@@ -48,7 +50,7 @@ def gap_page(found: Discrepancy) -> str:
         _before_and_after(found),
         "<h2>The noise</h2>" + _noise(found),
     ]
-    changes = change_lines(found)
+    changes = change_lines((*found.process_changes, *found.corrections))
     if changes:
         parts.append("<h2>What of the process was changed</h2>" + listed(changes))
     for k, look in enumerate(found.looks):
@@ -64,7 +66,8 @@ def gap_page(found: Discrepancy) -> str:
 def _headline(found: Discrepancy) -> str:
     names = [_called(effect) for effect in found.effects]
     if not names and not found.alternatives and found.process_changes:
-        return f"The process is another than the model: {'; '.join(change_lines(found))}"
+        said = "; ".join(change_lines(found.process_changes))
+        return f"The process is another than the model: {said}"
     if not names:
         names = [say.one_of(found.alternatives, found.probabilities)]
     return _HEADLINES[found.verdict].format(what=", and ".join(names))
@@ -224,6 +227,6 @@ def effect_card(effect: FoundEffect) -> str:
     return card(kind, say.place_of(effect.place), title, "\n".join(say.lines_of(effect)))
 
 
-def change_lines(found: Discrepancy) -> list[str]:
+def change_lines(changes: Sequence[ProcessChange]) -> list[str]:
     """Return what of the process was changed, one line each."""
-    return [f"{change.output}: {change.sentence}" for change in found.process_changes]
+    return [f"{change.output}: {change.sentence}" for change in changes]

@@ -111,6 +111,7 @@ class Discrepancy:
         untestable: effects that these records could not show.
         noise: per output the declared and the found noise.
         process_changes: what of the given process had to be changed, as far as it matters.
+        corrections: the changes of the given process that are too small to matter.
         before, after: gap per output on held-out rows.
         closed: share of the free-run excess over the noise floor that is gone.
         model_before, model_after: the loop models.
@@ -141,6 +142,7 @@ class Discrepancy:
     untestable: tuple[Testable, ...]
     noise: tuple[OutputNoise, ...]
     process_changes: tuple[ProcessChange, ...]
+    corrections: tuple[ProcessChange, ...]
     before: tuple[OutputGap, ...]
     after: tuple[OutputGap, ...]
     closed: float

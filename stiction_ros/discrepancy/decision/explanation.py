@@ -63,6 +63,11 @@ class ProcessChange:
     @property
     def sentence(self) -> str:
         """What it says, for people, such as ``dead time 2 s shorter than in the model``."""
+        small = "; this is too small to matter, and the model is corrected"
+        return self._size + ("" if self.matters else small)
+
+    @property
+    def _size(self) -> str:
         low, high = self.interval
         if self.what == "delay":
             side = "longer" if self.value > 0.0 else "shorter"

@@ -97,6 +97,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
         untestable=tuple(t for t in testable if not t.testable and (t.place, t.effect) not in told),
         noise=noises,
         process_changes=changes,
+        corrections=tuple(change for change in state.now.changes if not change.matters),
         before=before,
         after=after,
         closed=closed_share(before, after) if state.now.effects or state.now.changes else 0.0,
@@ -137,11 +138,7 @@ def _where(
     last = state.looks[-1].decision
     if last.verdict is GapVerdict.UNKNOWN:
         found.append(last.reason)
-    found += [
-        f"{each.output}: {each.sentence}; this is too small to matter, and the model is corrected"
-        for each in state.now.changes
-        if not each.matters
-    ]
+    found += [f"{e.output}: {e.sentence}" for e in state.now.changes if not e.matters]
     found += [f"{each} would fit, but closes next to nothing of the gap" for each in no_names]
     return tuple(found)
 
