@@ -114,12 +114,14 @@ def without_spikes(base: Baseline) -> Baseline:
     rows, asked = np.arange(len(base.run.runs)), [blocks.scored for blocks in base.blocks]
     for _ in range(TURNS):  # many of them hide each other
         runs, spikes = base.run.runs, np.zeros_like(base.run.runs.usable)
-        for i, (noise, usable) in enumerate(zip(base.noise, runs.usable, strict=True)):
-            if usable.any():
+        for i, usable in enumerate(runs.usable):
+            # spikes near each other make the noise another than the declared one
+            noises = [base.noise[i], *([base.under_declared(i)] if base.declared[i] else [])]
+            for noise in noises if usable.any() else []:
                 left = np.interp(rows, rows[usable], noise.residual[usable])
                 scale = max(noise.innovation_std, runs.quanta[i] / SURPRISE)  # a step is no spike
                 shocks = whiten(left, noise.ar) / scale
-                spikes[i] = asked[i] & usable & _alone(shocks, noise.ar)
+                spikes[i] |= asked[i] & usable & _alone(shocks, noise.ar)
         if not spikes.any():
             break
         alone = tuple((runs.alone + spikes.sum(axis=1)).tolist())
