@@ -210,8 +210,10 @@ def test_an_op_that_is_rounded_is_off_by_up_to_half_a_step_until_it_moves() -> N
     recorded = record(loop())
     assert unseen(loop(), recorded) == ()
     rounded = rounded_op(recorded, 0.2)
-    (found,) = unseen(loop(), rounded)
+    found, scan = unseen(loop(), rounded)
     assert found.variance == pytest.approx(0.2**2 / 12.0)
+    assert scan.keep == 0.0  # rounding hides whether the law scans again between the samples
+    assert 0.0 < scan.variance < np.diff(recorded.op[:, 0], 2).var() / 16.0
     hidden = (recorded.op - rounded.op)[:, 0]
     assert found.keep == pytest.approx(np.corrcoef(hidden[1:], hidden[:-1])[0, 1], abs=0.2)
     (found,) = unseen(loop(), rounded_op(by_hand(recorded), 0.2))
