@@ -72,7 +72,7 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
     chose are what they are, unless they lie finer than anybody chooses them. A controller that
     scans again between two samples holds another OP for half of them, which lies off the mean of
     its neighbours as far as a recorded one does off that of its own; that is asked only where no
-    PI law gives the recorded OP, or SP is not recorded.
+    PI law gives the recorded OP, rounding hides that law, or SP is not recorded.
 
     Args:
         runs: the records.

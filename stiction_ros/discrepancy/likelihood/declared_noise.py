@@ -104,7 +104,7 @@ def _whitened(
 ) -> DeclaredNoise:
     """Return the noise of states that one output sees beside a white one, as an autoregression.
 
-    Its last term stands for all that are left out, so that a level is forgotten as it should be.
+    Terms beyond the last one are added to the last one: noise with a pole at 1 keeps that pole.
 
     Args:
         states: their matrix, shape (n, n).

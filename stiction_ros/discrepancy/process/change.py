@@ -281,8 +281,8 @@ class _Search:
             value, low, high = (step * ends if late else np.maximum(1.0 + ends, 0.0)).tolist()
             model = None if own.lasts is None else own.lasts * step
             size = abs(float(self.values[k]))
-            lasts = size if late else MAJORITY if own.lasts is None else size * own.lasts
-            matters = lasts >= MAJORITY and (late or size >= SLIGHT)
+            lasts = np.inf if own.lasts is None else own.lasts  # samples; a gain has none
+            matters = size >= MAJORITY if late else size >= max(SLIGHT, MAJORITY / lasts)
             unit = "s" if late else "1"
             found.append(ProcessChange(name, own.what, value, (low, high), unit, model, matters))
         return found
